@@ -25,8 +25,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.system.errors import note
-from planners.system.writing import write_atomically
+from planners.system.errors import UsageError, note
+from planners.system.files import MAX_TEXT
+from planners.system.writing import made_folder, write_atomically
 
 #: What a job finds: arrays by name, no Python objects in them.
 Table = dict[str, NDArray[Any]]
@@ -38,6 +39,8 @@ Function = Callable[[Any, Any], Table]
 
 #: A table may take one part in so many of what a bounded store may take.
 _LARGEST = 4
+#: How often a table is written in a folder that others remove meanwhile.
+_TRIES = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +129,9 @@ class Store:
     begins with a hash of its key and of all that follows: a file that is damaged, or has the name
     of another one, is said and not believed.
 
-    The folder is made when it is written to.  Where it takes more than ``most_bytes``, files that
-    were not used for longest go.
+    The folder is made when it is written to.  Where the tables in it take more than
+    ``most_bytes``, those that were not used for longest go; among them is what processes that were
+    killed have half written.
     """
 
     path: Path
@@ -137,10 +141,11 @@ class Store:
         """The table of a key; None if there is none, or none that is whole."""
         path = self._path(key)
         try:
-            if not stat.S_ISREG(path.stat().st_mode):  # a pipe would be waited for
+            found = path.stat()
+            if not stat.S_ISREG(found.st_mode):  # a pipe would be waited for
                 self._ignore(path, "is no file")
                 return None
-            data = path.read_bytes()
+            data = path.read_bytes() if found.st_size <= self._largest else b""
             if self.most_bytes is not None:
                 with suppress(OSError):  # a folder that is only read
                     os.utime(path)  # it was used now
@@ -148,6 +153,9 @@ class Store:
             return None
         except OSError as error:
             self._ignore(path, f"cannot be read ({error.strerror})")
+            return None
+        except MemoryError:
+            self._ignore(path, "does not fit into the memory")
             return None
         begin, content = data[:32], data[32:]
         if begin != _hash(key, content):
@@ -157,14 +165,20 @@ class Store:
             return dict(arrays)
 
     def write(self, key: str, table: Table) -> None:
-        """Keep a table.  Raises `OSError` or `UsageError` where it cannot be written."""
+        """Keep a table, if it is not too large; raises `UsageError` where it cannot be written."""
         content = BytesIO()
         np.savez(content, **table)  # type: ignore[arg-type]
         data = _hash(key, content.getvalue()) + content.getvalue()
-        if self.most_bytes is not None and len(data) * _LARGEST > self.most_bytes:
+        if len(data) > self._largest:
             return
-        self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        write_atomically(self._path(key), data)
+        for left in reversed(range(_TRIES)):
+            try:
+                made_folder(self.path, 0o700)
+                write_atomically(self._path(key), data)
+                break
+            except UsageError:
+                if not left:
+                    raise
         if self.most_bytes is not None:
             self._let_go(self.most_bytes)
 
@@ -174,21 +188,28 @@ class Store:
         with suppress(OSError):  # it is gone already, or the folder is only read
             path.unlink()
 
+    @property
+    def _largest(self) -> int:
+        """Bytes of the largest file."""
+        return MAX_TEXT if self.most_bytes is None else self.most_bytes // _LARGEST
+
     def _path(self, key: str) -> Path:
         return self.path / f"{key}.table"
 
     def _let_go(self, most: int) -> None:
         """Remove files until the others take no more than ``most`` bytes."""
         entries = []
-        for path in self.path.glob("[!.]*"):  # others are being written
-            with suppress(FileNotFoundError):  # another process was faster
+        # Others are being written: they are the newest, unless their process was killed.
+        for path in (*self.path.glob("*.table"), *self.path.glob(".*.????????")):
+            with suppress(OSError):  # another process was faster
                 found = path.stat()
                 entries.append((found.st_mtime, found.st_size, path))
         left = sum(size for _, size, _ in entries)
         for _, size, path in sorted(entries):
             if left <= most:
                 break
-            path.unlink(missing_ok=True)
+            with suppress(OSError):  # it is gone already, or somebody else's
+                path.unlink()
             left -= size
 
 

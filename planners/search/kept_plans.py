@@ -16,7 +16,7 @@ from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
-from planners.system.errors import CoordlangError, note
+from planners.system.errors import UsageError, note
 
 if TYPE_CHECKING:
     import pathlib
@@ -69,7 +69,9 @@ def default_folder(environment: Mapping[str, str] = os.environ) -> pathlib.Path 
     import pathlib
 
     if chosen:
-        return pathlib.Path(chosen)
+        with suppress(FileNotFoundError):  # the working directory has been removed
+            return pathlib.Path(chosen).absolute()  # a worker may have another one
+        return None
     base = environment.get("XDG_CACHE_HOME", "")
     with suppress(RuntimeError):
         # By its specification a relative path is ignored.
@@ -115,8 +117,8 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
     found = optimal_plans.search(model, task)
     try:
         store.write(key, {name: getattr(found, name) for name in _KEPT})
-    except (OSError, CoordlangError) as error:
-        said = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]
+    except (UsageError, MemoryError) as error:
+        said = str(error).partition("\n")[0] or "out of memory"
         note(
             f"the plans that were found are not kept: {said} ({store.path})",
             remedy="Say --no-cache, or set COORDLANG_CACHE to a folder that you may write to.",

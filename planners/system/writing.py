@@ -42,7 +42,10 @@ def why_unwritable(path: str | Path, *, makes_folder: bool = False) -> str | Non
 
 def is_device(path: str | Path) -> bool:
     """Whether this is a device or a pipe: written to, and never replaced."""
-    return os.path.exists(path) and not os.path.isfile(path)
+    try:
+        return not stat.S_ISREG(os.stat(path).st_mode)  # asked once: it may go at any moment
+    except (OSError, ValueError):
+        return False
 
 
 def remove_file(path: str | Path | None) -> None:
@@ -89,10 +92,10 @@ def write_compressed(
     write_atomically(path, data, outdated=outdated)
 
 
-def made_folder(path: str | PathLike[str]) -> Path:
+def made_folder(path: str | PathLike[str], mode: int = 0o777) -> Path:
     """A folder, which is made if it is missing; raises `UsageError` if it cannot be."""
     try:
-        os.makedirs(path, exist_ok=True)  # of an empty name it is none, where Path means "."
+        os.makedirs(path, mode, exist_ok=True)  # of an empty name it is none: Path means "."
     except OSError as error:
         raise UsageError(
             f"the folder {path} cannot be made: {error.strerror}",

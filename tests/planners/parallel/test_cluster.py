@@ -21,15 +21,9 @@ from planners.parallel.workers import Workers
 from planners.parallel.workers import workers as opened
 from planners.system.errors import BadInput, CoordlangError, Note, OutOfTime, UsageError
 from planners.system.limits import time_limit
+from tests.support import cluster as dask
 from tests.support import jobs
-from tests.support.cluster import (
-    ENVIRONMENT,
-    SCHEDULER,
-    WORKER,
-    Cluster,
-    needs_distributed,
-    running_cluster,
-)
+from tests.support.cluster import ENVIRONMENT, Cluster, needs_distributed, running_cluster
 from tests.support.domains import DOMAINS
 from tests.support.jobs import batch, until, workers
 
@@ -104,9 +98,7 @@ def test_other_versions_are_refused(connected: Workers, monkeypatch: pytest.Monk
 
     ours = ("Python 2.7", *dask_cluster.versions("planners")[1:])
     monkeypatch.setattr(dask_cluster, "versions", lambda _: ours)
-    with pytest.raises(
-        UsageError, match=r"planners has Python 3.* there, Python 2.7 here"
-    ) as caught:
+    with pytest.raises(UsageError, match=r"has Python 3.* there, Python 2.7 here") as caught:
         list(connected.tables(batch(jobs.squares, 1, [range(2)])))
     assert "coordlang[cluster]" in str(caught.value)
 
@@ -180,7 +172,7 @@ def test_the_command_says_it_within_its_limit(silence: str) -> None:
 def test_other_code_that_cannot_read_a_job(other: str, tmp_path: Path) -> None:
     (tmp_path / "planners").mkdir()
     (tmp_path / "planners" / "__init__.py").touch()
-    commands = {"scheduler": SCHEDULER, "worker": WORKER}
+    commands = {"scheduler": dask.SCHEDULER, "worker": dask.WORKER}
     commands[other] = f"env PYTHONPATH={tmp_path} {commands[other]}"
     with (
         running_cluster(tmp_path, 1, **commands) as cluster,

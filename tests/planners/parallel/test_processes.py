@@ -12,6 +12,7 @@ from dataclasses import replace
 from multiprocessing import current_process, resource_tracker, spawn
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
+from shutil import rmtree
 from tempfile import TemporaryDirectory
 from unittest.mock import Mock
 
@@ -106,9 +107,14 @@ def test_no_worker_is_left(number: signal.Signals, tmp_path: Path) -> None:
     assert number == signal.SIGKILL or list(tmp_path.glob("half-*")) == []
 
 
-def test_no_worker_is_left_when_time_is_over(tmp_path: Path) -> None:
+def test_no_worker_is_left_where_time_is_over_or_the_iterator_is_left(tmp_path: Path) -> None:
     with pytest.raises(OutOfTime), time_limit(1.5):
         list(TWO.tables(batch(jobs.waits, str(tmp_path), [0, 1])))
+    assert not any(map(runs, workers(tmp_path)))
+    (tmp_path / "go").touch()
+    running = TWO.tables(batch(jobs.waits, str(tmp_path), range(8)))
+    assert int(next(running)["values"][0]) == 0
+    running.close()
     assert not any(map(runs, workers(tmp_path)))
 
 
@@ -145,14 +151,6 @@ def test_workers_that_cannot_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     with pytest.raises(UsageError, match="cannot be started: Resource temporarily") as error:
         list(TWO.tables(given))
     assert "--jobs 1" in str(error.value)
-
-
-def test_the_iterator_may_be_left_early(tmp_path: Path) -> None:
-    (tmp_path / "go").touch()
-    running = TWO.tables(batch(jobs.waits, str(tmp_path), range(8)))
-    assert int(next(running)["values"][0]) == 0
-    running.close()
-    assert not any(map(runs, workers(tmp_path)))
 
 
 def test_a_script_without_main_guard_is_not_run_again(tmp_path: Path) -> None:
@@ -192,11 +190,11 @@ def test_what_is_kept_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Monk
     assert results(store, squares)[1] == 5
 
 
-@pytest.mark.parametrize("damage", [b"", b"x" * 500, None, "other", "none"])
+@pytest.mark.parametrize("damage", [b"", b"x" * 500, None, "other", "none", "huge"])
 def test_a_damaged_table_is_worked_out_again_and_said(
     damage: bytes | str | None, tmp_path: Path
 ) -> None:
-    """One that is empty, noise, has another last byte, is that of another key, or is no file."""
+    """Empty, noise, with another last byte, that of another key, no file, or of 8 TiB."""
     squares, store = batch(jobs.squares, 3, PARTS), Store(tmp_path)
     first, _ = results(store, squares)
     path, other = sorted(tmp_path.iterdir())[2:4]
@@ -204,6 +202,8 @@ def test_a_damaged_table_is_worked_out_again_and_said(
     if damage == "none":
         path.unlink()
         path.symlink_to(path)
+    elif damage == "huge":
+        os.truncate(path, 2**43)
     elif damage == "other":
         path.write_bytes(other.read_bytes())
     else:
@@ -236,12 +236,7 @@ def test_tables_are_read_as_they_were_written(tmp_path: Path) -> None:
     for name, array in table.items():
         assert (read[name].dtype, read[name].shape) == (array.dtype, array.shape)
         assert (read[name] == array).all()
-
-
-def test_objects_are_not_read(tmp_path: Path) -> None:
-    """An array of Python objects would run code when it is read."""
-    store = Store(tmp_path)
-    store.write("k", {"objects": np.array([{}], object)})
+    store.write("k", {"objects": np.array([{}], object)})  # they would run code when read
     with pytest.raises(ValueError, match="allow_pickle"):
         store.read("k")
 
@@ -265,3 +260,19 @@ def test_no_folder(tmp_path: Path) -> None:
         given_workers(resume=tmp_path / "file" / "folder"),
     ):
         pytest.fail("there is no folder")
+    with pytest.raises(UsageError, match="cannot be made"):
+        Store(tmp_path / "file").write("k", {})
+
+
+def test_a_folder_that_is_removed_while_it_is_written_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    removed = [False, True, True]
+
+    def remove(_: int) -> None:
+        if removed.pop():
+            rmtree(tmp_path / "folder")
+
+    monkeypatch.setattr("planners.system.writing.os.fsync", remove)
+    Store(tmp_path / "folder").write("k", {"none": np.zeros(0)})
+    assert (tmp_path / "folder" / "k.table").exists()

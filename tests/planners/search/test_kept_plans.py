@@ -8,7 +8,7 @@ import os
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 from unittest.mock import Mock
 
 import numpy as np
@@ -21,7 +21,7 @@ from planners.pddl.model_options import Cost, ModelOptions
 from planners.search import kept_plans
 from planners.search.portions import Explored
 from planners.search.reachable import explore
-from planners.system.errors import BadInput, Note, ProvedImpossible
+from planners.system.errors import BadInput, Note, OutOfTime, ProvedImpossible
 from tests.support.domains import files_of
 from tests.support.random_pddl import KINDS, random_model
 from tests.support.random_spaces import equal
@@ -135,27 +135,31 @@ def test_the_oldest_entries_go(tmp_path: Path) -> None:
     for number in range(5):
         folder.write(f"k{number}", table)
         os.utime(folder.path / f"k{number}.table", (number, number))
-    other = folder.path / "of other code"
-    other.write_bytes(b"x" * size)
-    os.utime(other, (-1, -1))
+    for name in ("old.table", ".k1.table.0123abcd", "notes"):
+        other = folder.path / name
+        other.write_bytes(b"x" * size)
+        os.utime(other, (-1, -1))
     assert folder.read("k0") is not None  # and is the newest now
     folder.write("k5", table)
     names = [path.stem for path in entries(folder)]
-    assert names == ["k0", "k2", "k3", "k4", "k5"]
+    assert names == ["k0", "k2", "k3", "k4", "k5", "notes"]  # which are not ours
     folder.write("large", {"numbers": np.arange(10_000)})
-    assert len(entries(folder)) == 5
+    assert len(entries(folder)) == 6
+
+
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
-def test_a_full_disk_is_said(
-    call: str, folder: Store, searches: list[str], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("error", [FULL, MemoryError(), OutOfTime("over")])
+def test_plans_that_cannot_be_kept(
+    error: Exception, call: str, folder: Store, searches: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    full = Mock(side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
-    world = loaded()
-    with monkeypatch.context() as patched, kept_plans.keeping_plans(folder):
-        patched.setattr(f"planners.system.writing.os.{call}", full)
-        with pytest.warns(Note, match="not kept: .*No space left"):
-            kept_plans.search(world.model, world.tasks[0])
+    world, noted = loaded(), pytest.warns(Note, match="not kept: (out of memory|.*No space left)")
+    said: Any = pytest.raises(OutOfTime) if isinstance(error, OutOfTime) else noted
+    with monkeypatch.context() as patched, kept_plans.keeping_plans(folder), said:
+        patched.setattr(f"planners.system.writing.os.{call}", Mock(side_effect=error))
+        kept_plans.search(world.model, world.tasks[0])
     assert (len(searches), entries(folder)) == (1, [])
 
 
@@ -212,7 +216,7 @@ def test_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ({"XDG_CACHE_HOME": "relative"}, tmp_path / ".cache" / "coordlang"),
         ({"XDG_CACHE_HOME": f"{tmp_path}/xdg"}, tmp_path / "xdg" / "coordlang"),
         ({"XDG_CACHE_HOME": f"{tmp_path}/no/xdg"}, None),
-        ({"COORDLANG_CACHE": "here"}, Path("here")),
+        ({"COORDLANG_CACHE": "here"}, Path.cwd() / "here"),
         ({"COORDLANG_CACHE": "OFF", "XDG_CACHE_HOME": str(tmp_path)}, None),
     ):
         assert kept_plans.default_folder(given) == found
