@@ -44,6 +44,7 @@ from benchmarks.frame import (
     columns,
     on_grid,
     run_python,
+    shared,
 )
 from benchmarks.scale import Grid
 
@@ -93,7 +94,7 @@ TABLES = {
 def codmap(first: int) -> dict[str, tuple[Path, Path]]:
     """The problems of each domain, the smallest files first: domain and problem by name."""
     found = {}
-    for folder in sorted(path for path in (SHARED / "codmap").iterdir() if path.is_dir()):
+    for folder in sorted(path for path in shared("codmap").iterdir() if path.is_dir()):
         problems = [path for path in folder.glob("*.pddl") if path.name != "domain.pddl"]
         problems.sort(key=lambda path: (path.stat().st_size, path.name))
         for problem in problems[:first]:
@@ -103,13 +104,14 @@ def codmap(first: int) -> dict[str, tuple[Path, Path]]:
 
 def rows(first: int) -> list[str]:
     """The names of all rows."""
-    return [*(codmap(first) if SHARED.is_dir() else ()), *grids()]
+    return [*(codmap(first) if (SHARED / "codmap").is_dir() else ()), *grids()]
 
 
 def grids() -> list[str]:
     """The names of the rows of robots on grids."""
     corners = [f"corners {side}x{side}, {robots} robots" for side, robots in CORNERS]
-    if not SHARED.is_dir():
+    if not SCENARIOS.is_dir():
+        print(f"{SHARED} is missing: there are only robots in corners of grids", file=sys.stderr)
         return corners
     scenarios = [
         f"{path.stem}, {agents} agents"
@@ -144,7 +146,10 @@ def load(name: str, cost: str, *, asynchronous: bool = False) -> PlanningInstanc
         return scenario(name)
     if name.endswith("far apart"):
         return far_apart(name)
-    domain, problem = codmap(sys.maxsize)[name]
+    files = codmap(sys.maxsize)
+    if name not in files:
+        raise SystemExit(f"there is no row {name}")
+    domain, problem = files[name]
     options = ModelOptions(cost=cost, asynchronous=asynchronous)  # type: ignore[arg-type]
     return load_files(domain, [problem], options)
 
@@ -230,7 +235,8 @@ def cells(name: str, figures: Figures) -> list[object]:
 def print_page(asked: Asked, limit: int, found: Sequence[tuple[str, Figures]]) -> None:
     """Print a table as Markdown, how many rows are solved, and the versions that they are of."""
     solved = [name for name, figures in found if "plans" in figures]
-    print(f"### {asked.title}: {len(solved)} of {len(found)} solved in {limit} CPU s\n")
+    limits = ", ".join(map(str, sorted({figures.get("limit", limit) for _, figures in found})))
+    print(f"### {asked.title}: {len(solved)} of {len(found)} solved in {limits} CPU s\n")
     if asked.first:
         by_domain = Counter(name.split("/")[0] for name in solved)
         print(f"{', '.join(f'{domain} {n}' for domain, n in by_domain.items())}.\n")

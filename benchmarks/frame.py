@@ -25,6 +25,8 @@ from typing import TYPE_CHECKING, Any
 
 from generate import problem_text, scenario
 
+import coordlang
+
 if TYPE_CHECKING:
     from gridmap import GridMap
 
@@ -99,6 +101,9 @@ def asked_for(names: Iterable[str], given: Sequence[str]) -> list[str]:
     names = list(names)
     exact = {*names}.intersection(given)
     beginnings = tuple(text for text in given if text not in exact)
+    for text in beginnings:
+        if not any(name.startswith(text) for name in names):
+            print(f"no row is called {text}, or begins so", file=sys.stderr)
     return [n for n in names if not given or n in exact or n.startswith(beginnings)]
 
 
@@ -109,6 +114,8 @@ class KeptRows:
     """
 
     def __init__(self, path: Path | None, key: str = "row") -> None:
+        if path is not None and not path.resolve().parent.is_dir():
+            sys.exit(f"there is no folder {path.parent} to keep rows in")
         self._path, self._key = path, key
         self.rows: dict[str, Figures] = {}
         if path is not None and path.exists():
@@ -128,8 +135,8 @@ class KeptRows:
         """Add a row, or a newer one of the same name."""
         self.rows[figures[self._key]] = figures
         if self._path is not None:
-            with self._path.open("a") as file:
-                file.write(json.dumps(figures) + "\n")
+            with self._path.open("ab", buffering=0) as file:  # at once, whoever else writes to it
+                file.write((json.dumps(figures) + "\n").encode())
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,15 +212,27 @@ def limit(cpu: int) -> None:
 
 
 @cache
-def project() -> str:
-    """Return the version of this checkout: its commit, with a plus where files were changed."""
-    commit, changed = (
-        subprocess.run(
-            ["git", *command], cwd=ROOT, capture_output=True, text=True, check=True
-        ).stdout
-        for command in (("rev-parse", "--short", "HEAD"), ("status", "--porcelain", "-uno"))
-    )
+def project(root: Path = ROOT) -> str:
+    """Return the version of this checkout: its commit, with a plus where files were changed.
+
+    Of files without a history, or where git cannot tell, it is that of the package.
+    """
+    git = ["git", f"--git-dir={root / '.git'}", f"--work-tree={root}"]
+    try:
+        commit, changed = (
+            subprocess.run([*git, *command], capture_output=True, text=True, check=True).stdout
+            for command in (("rev-parse", "--short", "HEAD"), ("status", "--porcelain", "-uno"))
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return str(coordlang.__version__)
     return commit.strip() + "+" * bool(changed)
+
+
+def shared(folder: str) -> Path:
+    """Return a folder of what others made, which is not part of the project; end without it."""
+    if not (SHARED / folder).is_dir():
+        sys.exit(f"{SHARED / folder} is missing: benchmarks/README.md says what it is for")
+    return SHARED / folder
 
 
 def arguments(doc: str | None, seconds: int = 60) -> argparse.ArgumentParser:

@@ -33,7 +33,18 @@ def build(name: str, output: Path, *options: str) -> tuple[object, float, float]
     """Build a language as a process of its own: what it is, wall and processor seconds."""
     folder, _, stem = name.partition("/")
     files = [DOMAINS / folder / f"{file}.pddl" for file in ("domain", stem)]
-    command = ("-m", "coordlang", "build", *files, "--tasks", "all", "-o", output, *options)
+    command = (
+        "-m",
+        "coordlang",
+        "build",
+        *files,
+        "--tasks",
+        "all",
+        "--no-cache",
+        "-o",
+        output,
+        *options,
+    )
     done = run_python(command)
     if done.code:
         sys.exit(done.errors)
@@ -44,7 +55,10 @@ def build(name: str, output: Path, *options: str) -> tuple[object, float, float]
 
 def main() -> None:
     """Print the table."""
-    from distributed import LocalCluster
+    try:
+        from distributed import LocalCluster
+    except ImportError:
+        sys.exit("there is no Dask: pip install '.[cluster]'")
 
     name = sys.argv[1] if len(sys.argv) > 1 else "grid/corners-5x5"
     print(f"{name}, all pairs; {os.cpu_count()} cores")

@@ -319,6 +319,10 @@ def main() -> int:
     options = parser.parse_args()
     folder = options.folder.resolve()
     listed = commands()
+    if shutil.which(options.program) is None:
+        parser.error(f"there is no program {options.program}")
+    if not DOMAINS.is_dir() or Path.cwd().is_relative_to(folder):
+        parser.error("run it in a checkout, with another folder than that")
     shutil.rmtree(folder, ignore_errors=True)
     begin = perf_counter()
     worlds = [[*own] for _, own in groupby(listed, key=lambda command: command.world)]

@@ -45,7 +45,8 @@ SYMK = """
 import subprocess, sys
 from importlib.util import find_spec
 from pathlib import Path
-driver = Path(find_spec("up_symk").origin).parent / "symk" / "fast-downward.py"
+found = find_spec("up_symk") or sys.exit("ModuleNotFoundError: No module named 'up_symk'")
+driver = Path(found.origin).parent / "symk" / "fast-downward.py"
 plans = "plan_selection=top_k(num_plans=infinity,dump_plans=false)"
 search = f"symq_bd(simple=false,{plans},quality=1.0)"
 subprocess.run([sys.executable, driver, "domain.pddl", "problem.pddl", "--search", search])
@@ -60,6 +61,8 @@ def asked(python: str, planner: str, folder: Path, limit: int) -> Figures:
     """What a planner answers about the files in a folder."""
     script = ("-c", PLANNERS[planner])
     done = frame.run_python(script, 20 * limit, python, cpu=limit, folder=folder)
+    if "ModuleNotFoundError" in done.errors:
+        sys.exit(f"{python} has no {planner} ({done.why}): pip install '.[oracles]', or --python")
     text = done.output
     count, cost = re.search(r"Number of plans: (\d+)", text), re.search(r"Plan cost: (\d+)", text)
     return {
@@ -82,9 +85,10 @@ def measured(name: str, given: argparse.Namespace) -> Figures:
             files = tuple(DOMAINS / "grid" / f"{file}.pddl" for file in ("domain", task))
         else:
             form, cost = written(name, folder, given.cost), given.cost
-            files = coverage.codmap(sys.maxsize).get(name, ())
+            files = coverage.codmap(sys.maxsize).get(name, ()) if "/" in name else ()
         found = {planner: asked(given.python, planner, folder, given.limit) for planner in PLANNERS}
-    return {"row": name, **form, **found, "coordlang": ours(files, cost, given.limit)}
+    row = {"row": f"{name} ({given.cost})", **form, **found}
+    return {**row, "coordlang": ours(files, cost, given.limit)}
 
 
 def written(name: str, folder: Path, cost: str) -> Figures:
@@ -113,14 +117,18 @@ def print_page(rows: Sequence[Figures]) -> None:
     """Print CPU seconds as Markdown, and in brackets those after which there was no answer."""
     lines = []
     for row in rows:
-        (plans,) = {row[name]["plans"] for name in ("coordlang", *PLANNERS)} - {None}
+        answers = [row[name] for name in ("coordlang", *PLANNERS) if row[name]]
+        counted = {answer["plans"] for answer in answers} - {None}
+        if len(counted) > 1:
+            sys.exit(f"{row['row']}: {counted} plans")
         seconds = [
-            f"{row[name]['seconds']:.2f}"
-            if row[name]["plans"] is not None
-            else f"({row[name]['seconds']:.0f})"
-            for name in ("coordlang", *PLANNERS)
+            f"{answer['seconds']:.2f}"
+            if answer["plans"] is not None
+            else f"({answer['seconds']:.0f})"
+            for answer in answers
         ]
-        lines.append([row["row"], plans, *seconds])
+        plans, missing = min(counted, default=None), [None] * (len(PLANNERS) + 1 - len(answers))
+        lines.append([row["row"].rpartition(" (")[0], plans, *missing, *seconds])
     print(frame.markdown(["task", "optimal plans", "coordlang", *PLANNERS], lines))
 
 
@@ -133,9 +141,13 @@ def main() -> None:
     parser.add_argument("--markdown", action="store_true", help="the table of docs/coverage.md")
     given = parser.parse_args()
     known = KeptRows(given.kept)
+
+    def kept(name: str) -> Figures:
+        return known.get(f"{name} ({given.cost})", partial(measured, name, given))
+
     names = asked_for([*WHOLE, *coverage.rows(given.first)], given.rows or SHOWN * given.markdown)
     if given.markdown:
-        print_page([known.get(name, partial(measured, name, given)) for name in names])
+        print_page([kept(name) for name in names])
         return
     shown = (*PLANNERS, "coordlang")
     columns = [("row", -38), ("form", -17), ("actions", 8)]
@@ -143,8 +155,8 @@ def main() -> None:
         columns += [(planner, 9), ("MB", 5), ("plans", 9)]
     table = PrintedTable(*columns)
     for name in names:
-        found = known.get(name, partial(measured, name, given))
-        cells = [found["row"], found["form"], found.get("actions")]
+        found = kept(name)
+        cells = [name, found["form"], found.get("actions")]
         for planner in shown:
             cells += [found.get(planner, {}).get(key) for key in ("seconds", "memory", "plans")]
         table.print(*cells)

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Processes of robots that act under a sentence in buildings of Open-RMF.
 
-    python -m benchmarks.robots [ROW ..] [--runs N] [--kill] [--kept FILE]
+    python -m benchmarks.robots [ROW ..] [--runs N] [--kill] [--limit SECONDS] [--kept FILE]
 
 A row is a building and a number of robots, ``office-2``, each of which drives to a place that is
-drawn; there are some tasks for each row. Every robot is a process (forked when its choices are
-known), plays itself, and hears the others over ``--bus unix``. With ``--kill`` one of them is
-killed at some moment before all are done, and started again. The lines that the processes wrote are
-checked by definition: no event overlaps one that it interferes with, and all events in the order of
-their starts are a plan that the independent checker accepts. The columns: runs; runs in which
-something overlapped, in which somebody had not ended after a minute, and in which all arrived;
-robots killed; events and messages of a run.
+drawn; there are some tasks for each row, those with a language within the limit (30). Every robot
+is a process (forked when its choices are known), plays itself, and hears the others over ``--bus
+unix``. With ``--kill`` one of them is killed at some moment before all are done, and started again.
+The lines that the processes wrote are checked by definition: no event overlaps one that it
+interferes with, and all events in the order of their starts are a plan that the independent checker
+accepts. The columns: runs; runs in which something overlapped, in which somebody had not ended
+after a minute, and in which all arrived; robots killed; events and messages of a run.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import signal
 import sys
 import tempfile
 import traceback
+from argparse import Namespace
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -32,7 +33,7 @@ from typing import Any
 
 import coordlang
 from benchmarks import frame
-from benchmarks.frame import SHARED, Figures, KeptRows, PrintedTable, columns
+from benchmarks.frame import Figures, KeptRows, PrintedTable, columns, shared
 from coordlang.commands.records import RobotOptions
 from coordlang.commands.robot import RobotInTask, robot
 from planners.check.rules import validate
@@ -45,8 +46,8 @@ from planners.system.limits import time_limit
 
 BUILDINGS = ("office", "hotel", "campus", "triple_H")
 ROWS = [f"{name}-{robots}" for name in BUILDINGS for robots in (2, 3, 4)]
-#: Tasks of a row, and how many are tried, each for so many seconds.
-TASKS, TRIES, LIMIT = 5, 10, 30
+#: Tasks of a row, and how many are tried.
+TASKS, TRIES = 5, 10
 #: Metres a second, and seconds after which a run is stuck.
 SPEED, STUCK = 60.0, 60.0
 COLUMNS = columns(
@@ -187,13 +188,13 @@ class Run:
         return [json.loads(line) for line in text.split("\n") if line.endswith("}")]
 
 
-def tasks_of(name: str, robots: int) -> Iterator[Task]:
+def tasks_of(name: str, robots: int, limit: float) -> Iterator[Task]:
     """Teams in tasks in a building, each robot to another place that is drawn.
 
-    Tasks without a plan or a language within a limit are left out.
+    Tasks without a plan or a language within ``limit`` seconds are left out.
     """
     random = Random(f"{name} {robots}")
-    path = SHARED / "rmf" / f"{name}.building.yaml"
+    path = shared("rmf") / f"{name}.building.yaml"
     site = coordlang.import_site(path, robots=robots)
     read = json.loads(site.texts["coordinates.json"])["coordinates"]
     points = {place: (x, y) for place, (x, y) in read.items()}
@@ -201,7 +202,7 @@ def tasks_of(name: str, robots: int) -> Iterator[Task]:
     for _ in range(TRIES):
         goals = random.sample(sorted(points), robots)
         pairs = [f"{own}:{place}" for own, place in zip(site.robots, goals, strict=True)]
-        with suppress(CoordlangError), time_limit(LIMIT):
+        with suppress(CoordlangError), time_limit(limit):
             texts = coordlang.import_site(path, robots=robots, task=pairs).texts
             domain = parse_domain(Source("domain.pddl", texts["domain.pddl"]))
             problem = parse_problem(Source("problem.pddl", texts["problem.pddl"]), domain)
@@ -215,17 +216,17 @@ def tasks_of(name: str, robots: int) -> Iterator[Task]:
             return
 
 
-def measured(row: str, runs: int, is_killing: bool) -> Figures:
-    """The figures of a row."""
+def measured(key: str, row: str, given: Namespace) -> Figures:
+    """The figures of a row, to be kept under a key."""
     name, _, robots = row.rpartition("-")
-    tasks = [*tasks_of(name, int(robots))]
+    tasks, runs = [*tasks_of(name, int(robots), given.limit)], given.runs
     figures: Figures = dict.fromkeys(dict(COLUMNS), 0)
-    figures |= {"row": row, "tasks": len(tasks), "runs": runs if tasks else 0}
+    figures |= {"row": key, "tasks": len(tasks), "runs": runs if tasks else 0}
     for seed in range(figures["runs"]):
         team, loaded = tasks[seed % len(tasks)]
         with tempfile.TemporaryDirectory() as folder:
             run = Run(team, Path(folder), seed)
-            has_ended = run.wait(run.random.uniform(0, 0.6) if is_killing else None)
+            has_ended = run.wait(run.random.uniform(0, 0.6) if given.kill else None)
             lines = {own: run.lines(own) for own in team}
         did = {own: spans(its) for own, its in lines.items()}
         figures["stuck"] += not has_ended
@@ -243,15 +244,16 @@ def measured(row: str, runs: int, is_killing: bool) -> Figures:
 
 def main() -> None:
     """Print the rows that are asked for."""
-    parser = frame.arguments(__doc__)
+    parser = frame.arguments(__doc__, 30)
     parser.add_argument("--runs", type=int, default=100, help="of a row (100)")
     parser.add_argument("--kill", action="store_true", help="kill one process in each run")
     given = parser.parse_args()
     kept = KeptRows(given.kept)
     table = PrintedTable(*COLUMNS)
     for row in frame.asked_for(ROWS, given.rows):
-        figures = kept.get(row, lambda: measured(row, given.runs, given.kill))  # noqa: B023
-        table.print(*(figures[head] for head, _ in COLUMNS))
+        key = f"{row}, {given.runs} runs{', killed' * given.kill}, {given.limit} s"
+        figures = kept.get(key, partial(measured, key, row, given))
+        table.print(row, *(figures[head] for head, _ in COLUMNS[1:]))
 
 
 if __name__ == "__main__":

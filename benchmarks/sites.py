@@ -47,7 +47,10 @@ COLUMNS = columns(
 
 def rows(folder: Path) -> list[str]:
     """The names of all rows."""
-    names = [path.name.removesuffix(".building.yaml") for path in sorted(folder.glob("*.yaml"))]
+    found = sorted(path.name for path in folder.glob("*.building.yaml"))
+    names = [name.removesuffix(".building.yaml") for name in found]
+    if not names:
+        raise SystemExit(f"there is no *.building.yaml in {folder}")
     kinds = [kind + mode for kind in KINDS for mode in ("", " asynchronous")]
     return [f"{name} {kind}" for name in names for kind in kinds]
 
@@ -62,8 +65,9 @@ def candidates_of(folder: Path, row: str) -> Candidates:
     from planners.pddl import read_domain, read_problem
     from planners.pddl.model_options import ModelOptions
 
-    name, kind, number, *mode = row.split()
-    options, file = ModelOptions(asynchronous=bool(mode)), folder / f"{name}.building.yaml"
+    in_step = row.removesuffix(" asynchronous")
+    name, kind, number = in_step.rsplit(maxsplit=2)
+    options, file = ModelOptions(asynchronous=in_step != row), folder / f"{name}.building.yaml"
     with TemporaryDirectory() as made:
         site = import_site(file, robots=int(number))
         site.save(made)

@@ -45,13 +45,11 @@ class SuccessRates:
     """Exact success rates of one task under one disruption, over plans drawn uniformly.
 
     ``plan``: the share of optimal plans that need no forbidden subaction.  ``sentence``: the share
-    of optimal plans under whose sentence every robot has a choice that needs none.  ``possible``:
-    whether any optimal plan needs none: what robots could reach that agree again.
+    of optimal plans under whose sentence every robot has a choice that needs none.
     """
 
     plan: float
     sentence: float
-    possible: bool
 
 
 def success_rates(
@@ -82,8 +80,8 @@ def success_rates(
         left, own = counted(np.all(spared, axis=0)), list(map(counted, spared))
         for task, (row, said) in enumerate(zip(found, every, strict=True)):
             good = sum(n for words, n in said.items() if all(words in of[task] for of in own))
-            total, plans = said.total(), left[task].total()
-            row.append(SuccessRates(plans / total, good / total, plans > 0))
+            total = said.total()
+            row.append(SuccessRates(left[task].total() / total, good / total))
     return found
 
 
@@ -130,8 +128,7 @@ class Trials:
     def exact(self) -> dict[str, float] | None:
         """Return the success rates over all trials, plans drawn uniformly.
 
-        ``possible`` is the rate of trials in which some optimal plan of every task succeeds.  None
-        where there are too many sentences.
+        None where there are too many sentences.
         """
         space, word = self.languages[0].space, self.languages[0].word
         try:
@@ -141,7 +138,7 @@ class Trials:
         found = [[rates[task][trial.disruption] for task in trial.tasks] for trial in self.trials]
         return {
             what: round(fmean(prod(getattr(rate, what) for rate in legs) for legs in found), 6)
-            for what in ("plan", "sentence", "possible")
+            for what in ("plan", "sentence")
         }
 
 

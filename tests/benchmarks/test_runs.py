@@ -13,6 +13,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+import coordlang
+from benchmarks import frame
 from benchmarks.frame import KeptRows, asked_for, run_python
 from benchmarks.paper import communication, game, table1
 from benchmarks.paper.__main__ import RECIPES, main
@@ -196,19 +198,28 @@ NAMES = ("depot/pfile1", "depot/pfile13", "depot/pfile3", "taxi/p01")
 @pytest.mark.parametrize(
     ("given", "rows"),
     [
-        ([], NAMES),
-        (["depot/pfile1"], ("depot/pfile1",)),
-        (["depot/pfile"], NAMES[:3]),
-        (["depot/pfile3", "depot/pfile1"], ("depot/pfile1", "depot/pfile3")),
-        (["taxi", "depot/pfile1"], ("depot/pfile1", "taxi/p01")),
-        (["depot/pfile1", "depot"], NAMES[:3]),
-        (["rovers"], ()),
+        *(([], NAMES), (["depot/pfile1"], NAMES[:1]), (["depot/pfile"], NAMES[:3])),
+        *((["depot/pfile3", "depot/pfile1"], NAMES[:3:2]), (["depot/pfile1", "depot"], NAMES[:3])),
+        *((["taxi", "depot/pfile1"], NAMES[::3]), (["rovers"], ())),
     ],
 )
 def test_a_name_is_that_row_and_a_beginning_is_every_row_it_begins(
     given: list[str], rows: tuple[str, ...]
 ) -> None:
     assert asked_for(NAMES, given) == [*rows]
+
+
+def test_what_is_missing_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert frame.project(tmp_path) == coordlang.__version__
+    asked_for(NAMES, ["rovers", "taxi"])
+    assert capsys.readouterr().err == "no row is called rovers, or begins so\n"
+    monkeypatch.setattr(frame, "SHARED", tmp_path)
+    with pytest.raises(SystemExit, match="codmap is missing"):
+        frame.shared("codmap")
+    with pytest.raises(SystemExit, match="there is no folder"):
+        KeptRows(tmp_path / "none" / "rows.jsonl")
 
 
 def test_rows_are_measured_once_and_a_line_that_was_cut_off_again(tmp_path: Path) -> None:
