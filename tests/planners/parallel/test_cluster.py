@@ -68,22 +68,21 @@ def test_results_and_errors(connected: Workers) -> None:
     until(lambda: left_on(connected) == (0, []))
 
 
-@pytest.mark.parametrize("how", ["interrupt", "time limit"])
-def test_work_that_is_stopped_leaves_nothing(how: str, connected: Workers, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("ends", "limit"), [(KeyboardInterrupt, None), (OutOfTime, 2)])
+def test_work_that_is_stopped_leaves_nothing(
+    ends: type[BaseException], limit: int | None, connected: Workers, tmp_path: Path
+) -> None:
     def interrupt() -> None:
         until(lambda: workers(tmp_path))
         os.kill(os.getpid(), signal.SIGINT)
 
     waiting = batch(jobs.waits, str(tmp_path), [0, 1, 2])
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    if limit is None:
+        threading.Thread(target=interrupt).start()
     try:
-        if how == "interrupt":
-            threading.Thread(target=interrupt).start()
-            with pytest.raises(KeyboardInterrupt):
-                list(connected.tables(waiting))
-        else:
-            with pytest.raises(OutOfTime), time_limit(2):
-                list(connected.tables(waiting))
+        with pytest.raises(ends), time_limit(limit):
+            list(connected.tables(waiting))
     finally:
         signal.signal(signal.SIGINT, before)
     (tmp_path / "go").touch()  # what is under way ends by itself
@@ -156,12 +155,8 @@ def test_there_is_no_cluster(
 def test_the_command_says_it_within_its_limit(silence: str) -> None:
     files = [DOMAINS / "grid" / f"{stem}.pddl" for stem in ("domain", "corners-6x6")]
     limits = ["--tasks", "all", "-o", "-", "--scheduler", silence, "--time-limit", "3"]
-    done = subprocess.run(
-        [sys.executable, "-m", "coordlang", "build", *files, *limits],
-        capture_output=True,
-        text=True,
-        env=ENVIRONMENT,
-    )
+    command = [sys.executable, "-m", "coordlang", "build", *map(str, files), *limits]
+    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT)
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 2
     assert "no Dask scheduler answers" in done.stderr

@@ -12,7 +12,7 @@ from dataclasses import replace
 from multiprocessing import current_process, resource_tracker, spawn
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
-from shutil import rmtree
+from shutil import move
 from tempfile import TemporaryDirectory
 from unittest.mock import Mock
 
@@ -27,6 +27,7 @@ from planners.parallel.workers import Workers
 from planners.parallel.workers import workers as given_workers
 from planners.system.errors import BadInput, Note, OutOfMemory, OutOfTime, UsageError
 from planners.system.limits import address_space, limited_memory, time_limit
+from planners.system.writing import is_device
 from tests.support import jobs
 from tests.support.command import program
 from tests.support.domains import ROOT
@@ -48,11 +49,9 @@ def test_jobs_do_not_matter_and_small_work_stays_here(monkeypatch: pytest.Monkey
 
     parts = [range(low, low + 3) for low in range(0, 15, 3)]
     squares = batch(jobs.squares, 3, parts)
-    results = {
-        number: [table["values"].tolist() for table in Workers(number).tables(squares)]
-        for number in (1, 2)
-    }
-    assert results[1] == results[2] == [[3 * n * n for n in part] for part in parts]
+    wanted = [[3 * n * n for n in part] for part in parts]
+    for number in (1, 2):
+        assert [table["values"].tolist() for table in Workers(number).tables(squares)] == wanted
     assert os.getpid() not in who(squares)
     assert who(batch(jobs.squares, 3, parts, efforts=[1.0] * len(parts))) == {os.getpid()}
     monkeypatch.setitem(vars(current_process())["_config"], "daemon", True)
@@ -87,19 +86,15 @@ def test_memory_is_divided_among_processes() -> None:
 
 def script(folder: Path, lines: str) -> subprocess.Popen[bytes]:
     """A program that begins with `SCRIPT`, and the folder as its argument."""
-    return subprocess.Popen(
-        [sys.executable, "-c", SCRIPT + lines, folder],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
+    command, pipe = [sys.executable, "-c", SCRIPT + lines, str(folder)], subprocess.PIPE
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_no_worker_is_left(number: signal.Signals, tmp_path: Path) -> None:
     """And one that is asked to end removes what it writes."""
-    process = script(
-        tmp_path, "list(Workers(2).tables(jobs.batch(jobs.removes, sys.argv[1], [0, 1])))"
-    )
+    work = "list(Workers(2).tables(jobs.batch(jobs.removes, sys.argv[1], [0, 1])))"
+    process = script(tmp_path, work)
     until(lambda: len(workers(tmp_path)) == 2)
     process.send_signal(number)
     process.communicate(timeout=60)
@@ -124,11 +119,8 @@ def test_no_worker_is_left_where_time_is_over_or_the_iterator_is_left(tmp_path: 
 def test_one_worker_is_ended_and_its_job_done_by_another(
     number: signal.Signals, count: int, tmp_path: Path
 ) -> None:
-    process = script(
-        tmp_path,
-        "found = Workers(2).tables(jobs.batch(jobs.waits, sys.argv[1], [0, 1, 2]))\n"
-        "print([int(table['values'][0]) for table in found])",
-    )
+    found = "Workers(2).tables(jobs.batch(jobs.waits, sys.argv[1], [0, 1, 2]))"
+    process = script(tmp_path, f"print([int(table['values'][0]) for table in {found}])")
     until(lambda: len(workers(tmp_path)) == 2)
     os.kill(workers(tmp_path)[0], number)
     until(lambda: len(workers(tmp_path)) == count)
@@ -154,10 +146,8 @@ def test_workers_that_cannot_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
 
 
 def test_a_script_without_main_guard_is_not_run_again(tmp_path: Path) -> None:
-    (tmp_path / "script.py").write_text(
-        SCRIPT
-        + "print(len(list(Workers(2).tables(jobs.batch(jobs.squares, 1, [range(2)] * 2)))))\n"
-    )
+    line = "print(len(list(Workers(2).tables(jobs.batch(jobs.squares, 1, [range(2)] * 2)))))\n"
+    (tmp_path / "script.py").write_text(SCRIPT + line)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-P", "script.py"]
     assert subprocess.check_output(command, cwd=tmp_path, env=environment, timeout=60) == b"2\n"
@@ -255,24 +245,20 @@ def test_digests_tell_values_apart() -> None:
 
 def test_no_folder(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with (
-        pytest.raises(UsageError, match="cannot be made"),
-        given_workers(resume=tmp_path / "file" / "folder"),
-    ):
+    refused = pytest.raises(UsageError, match="cannot be made")
+    with refused, given_workers(resume=tmp_path / "file" / "folder"):
         pytest.fail("there is no folder")
-    with pytest.raises(UsageError, match="cannot be made"):
+    with refused:
         Store(tmp_path / "file").write("k", {})
 
 
 def test_a_folder_that_is_removed_while_it_is_written_to(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    removed = [False, True, True]
-
-    def remove(_: int) -> None:
-        if removed.pop():
-            rmtree(tmp_path / "folder")
-
+    folder, times = tmp_path / "folder", [False, True, True]
+    remove = Mock(side_effect=lambda _: times.pop() and move(folder, tmp_path / "gone"))
     monkeypatch.setattr("planners.system.writing.os.fsync", remove)
-    Store(tmp_path / "folder").write("k", {"none": np.zeros(0)})
-    assert (tmp_path / "folder" / "k.table").exists()
+    Store(folder).write("k", {"none": np.zeros(0)})
+    assert (folder / "k.table").exists()
+    monkeypatch.setattr("os.path.exists", lambda _: True)  # it was there a moment ago
+    assert not is_device(folder / "gone")

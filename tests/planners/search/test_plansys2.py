@@ -66,11 +66,8 @@ def test_command(coordlang: Command, tmp_path: Path) -> None:
     language = tmp_path / "l.json"
     coordlang("build", *files, "--method", "greedy", "-o", language)
     shown = coordlang("plan", language, *files, "w1 w0", "--format", "plansys2").out
-    assert [(time, action) for time, action, _ in items(shown)] == [
-        (0.0, "(move r1 a c)"),
-        (1.0, "(move r1 c b)"),
-        (1.0, "(move r2 b a)"),
-    ]
+    moves = [(0.0, "(move r1 a c)"), (1.0, "(move r1 c b)"), (1.0, "(move r2 b a)")]
+    assert [(time, action) for time, action, _ in items(shown)] == moves
     as_json = coordlang("plan", language, *files, "w1 w0", "--format", "json").out
     assert as_json == coordlang("plan", language, *files, "w1 w0", "--json").out
     assert coordlang("plan", language, *files, "w1 w0", "--json", "--format", "ipc").code == 2
