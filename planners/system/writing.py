@@ -51,7 +51,7 @@ def is_device(path: str | Path) -> bool:
 def remove_file(path: str | Path | None) -> None:
     """Remove a file; nothing for None, for what is missing, and for a device or a pipe."""
     if path is not None and os.path.isfile(path):
-        os.unlink(os.path.realpath(path))
+        Path(os.path.realpath(path)).unlink(missing_ok=True)
 
 
 def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | None = None) -> None:
@@ -177,13 +177,15 @@ def _set_aside(path: str | Path | None) -> Iterator[None]:
         return
     old = Path(os.path.realpath(path))
     aside = _beside(old)
-    os.replace(old, aside)
+    with suppress(FileNotFoundError):  # another process has just moved it
+        os.replace(old, aside)
     try:
         yield
     except OSError:
-        os.replace(aside, old)
+        if aside.exists():
+            os.replace(aside, old)
         raise
-    aside.unlink()
+    aside.unlink(missing_ok=True)
 
 
 def _beside(target: Path) -> Path:

@@ -27,7 +27,7 @@ from planners.parallel.workers import Workers
 from planners.parallel.workers import workers as given_workers
 from planners.system.errors import BadInput, Note, OutOfMemory, OutOfTime, UsageError
 from planners.system.limits import address_space, limited_memory, time_limit
-from planners.system.writing import is_device
+from planners.system.writing import is_device, write_atomically
 from tests.support import jobs
 from tests.support.command import program
 from tests.support.domains import ROOT
@@ -224,8 +224,7 @@ def test_tables_are_read_as_they_were_written(tmp_path: Path) -> None:
     assert read is not None
     assert read.keys() == table.keys()
     for name, array in table.items():
-        assert (read[name].dtype, read[name].shape) == (array.dtype, array.shape)
-        assert (read[name] == array).all()
+        np.testing.assert_array_equal(read[name], array, strict=True)
     store.write("k", {"objects": np.array([{}], object)})  # they would run code when read
     with pytest.raises(ValueError, match="allow_pickle"):
         store.read("k")
@@ -252,13 +251,15 @@ def test_no_folder(tmp_path: Path) -> None:
         Store(tmp_path / "file").write("k", {})
 
 
-def test_a_folder_that_is_removed_while_it_is_written_to(
+def test_what_others_remove_meanwhile_stops_no_writing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder, times = tmp_path / "folder", [False, True, True]
+    folder, times = tmp_path / "folder", [False, False, True, True]
     remove = Mock(side_effect=lambda _: times.pop() and move(folder, tmp_path / "gone"))
     monkeypatch.setattr("planners.system.writing.os.fsync", remove)
     Store(folder).write("k", {"none": np.zeros(0)})
     assert (folder / "k.table").exists()
-    monkeypatch.setattr("os.path.exists", lambda _: True)  # it was there a moment ago
+    for name in ("exists", "isfile"):  # it was there a moment ago
+        monkeypatch.setattr(f"os.path.{name}", lambda _: True)
     assert not is_device(folder / "gone")
+    write_atomically(folder / "new", b"", outdated=folder / "gone")
