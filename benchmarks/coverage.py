@@ -255,7 +255,9 @@ def main() -> None:
     parser.add_argument("--table", choices=[*TABLES, "all"], help="a table of docs/coverage.md")
     parser.add_argument("--markdown", action="store_true", help="print it as it stands there")
     parser.add_argument("--first", type=int, default=10, metavar="N", help="problems of a domain")
-    parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
+    parser.add_argument(
+        "--cost", choices=frame.COSTS, default="makespan+actions", help="of CoDMAP's"
+    )
     parser.add_argument("--asynchronous", action="store_true", help="plans up to timing")
     given = parser.parse_args()
     own = Asked("Rows as asked for", given.first, given.cost, given.asynchronous)

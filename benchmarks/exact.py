@@ -51,7 +51,7 @@ COLUMNS = columns(
 def main() -> None:
     """Print the table."""
     parser = frame.arguments(__doc__, 600)
-    parser.add_argument("--cost", default="makespan+actions")
+    parser.add_argument("--cost", choices=frame.COSTS, default="makespan+actions")
     parser.add_argument("--asynchronous", action="store_true", help="robots keep no common step")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="processes of each search")

@@ -41,6 +41,9 @@ MOST = 600
 #: Address space of a process with limits, in bytes.
 MEMORY = 8 << 30
 
+#: What ``--cost`` takes.
+COSTS = ("makespan", "makespan+actions", "makespan+cost")
+
 #: The figures of a row, its name among them as ``row``.
 Figures = dict[str, Any]
 

@@ -136,7 +136,7 @@ def main() -> None:
     """Print what the arguments say."""
     parser = frame.arguments(__doc__)
     parser.add_argument("--first", type=int, default=3, metavar="N", help="problems of a domain")
-    parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
+    parser.add_argument("--cost", choices=frame.COSTS, default="makespan+actions")
     parser.add_argument("--python", default=sys.executable, help="a Python that has the planners")
     parser.add_argument("--markdown", action="store_true", help="the table of docs/coverage.md")
     given = parser.parse_args()

@@ -70,6 +70,7 @@ def main(arguments: list[str] | None = None) -> None:
         if {recipe.name, "all"} & {*given.names}:
             run(recipe, settings, folder, given.jobs)
     page = given.page or folder / "evaluation.md"
+    page.parent.mkdir(parents=True, exist_ok=True)
     write_page(RECIPES, settings, folder, page)
     print(f"written: {page}")
 

@@ -27,6 +27,8 @@ _AGAIN = 5.0
 #: And very soon where Python itself lost it: an exception cannot leave a finalizer or the callback
 #: of a weak reference.
 _SOON = 0.01
+#: Seconds until a timer rings that is to ring at once.
+_AT_ONCE = 1e-6
 #: Seconds that no timer counts to the end (some cannot be set to more).
 _FOR_EVER = 1e9
 #: Seconds for what has to follow on work that a limit ended: the clock has been stopped by then.
@@ -90,7 +92,7 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     outer, again = signal.getitimer(signal.ITIMER_REAL)
     try:
         # Inside: it may ring at once; and 0 would stop the clock.
-        signal.setitimer(signal.ITIMER_REAL, max(1e-6, seconds), _AGAIN)
+        signal.setitimer(signal.ITIMER_REAL, max(_AT_ONCE, seconds), _AGAIN)
         yield
     except Exception as error:
         is_ours = isinstance(error, CoordlangError | MemoryError | AssertionError)

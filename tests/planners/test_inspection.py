@@ -187,15 +187,15 @@ def test_limits_within_limits() -> None:
             assert 75 < limits.time_left() <= 100
         assert 75 < limits.time_left() <= 100
     assert limits.time_left() == math.inf
-    with (
-        pytest.raises(OutOfTime, match=r"limit of 0\.05 s"),
-        limits.time_limit(0.05),
-        limits.time_limit(10),
-    ):
+    over = pytest.raises(OutOfTime, match=r"limit of 0\.05 s")
+    with over, limits.time_limit(0.05), limits.time_limit(10):
         time.sleep(2)
+    for nothing in (0, -1):
+        with pytest.raises(OutOfTime), limits.time_limit(nothing):
+            time.sleep(2)
 
     def inner_then_outer() -> None:
-        with pytest.raises(OutOfTime, match=r"limit of 0\.05 s"), limits.time_limit(0.05):
+        with over, limits.time_limit(0.05):
             time.sleep(2)
         time.sleep(2)
 
