@@ -33,19 +33,8 @@ def build(name: str, output: Path, *options: str) -> tuple[object, float, float]
     """Build a language as a process of its own: what it is, wall and processor seconds."""
     folder, _, stem = name.partition("/")
     files = [DOMAINS / folder / f"{file}.pddl" for file in ("domain", stem)]
-    command = (
-        "-m",
-        "coordlang",
-        "build",
-        *files,
-        "--tasks",
-        "all",
-        "--no-cache",
-        "-o",
-        output,
-        *options,
-    )
-    done = run_python(command)
+    command = ("-m", "coordlang", "build", *files, "--tasks", "all", "--no-cache", "-o", output)
+    done = run_python((*command, *options))
     if done.code:
         sys.exit(done.errors)
     language = json.loads(output.read_text())
