@@ -35,7 +35,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
-from planners.system.errors import OutOfMemory, OutOfTime, ProvedImpossible
+from planners.system.errors import OutOfMemory, OutOfTime, ProvedImpossible, UsageError
 from planners.system.limits import time_limit
 
 FURTHER = ("open-2x6", "open-3x4", "open-3x5", "open-4x4", "ring-4x5")
@@ -86,7 +86,10 @@ def candidates_of(name: str, cost: str, *, asynchronous: bool = False) -> Candid
     if match is None:
         raise SystemExit(f"there is no row {name}")
     make = {"open": open_grid, "ring": ring}[match[1]]
-    domain, problem = on_grid(name, make(int(match[2]), int(match[3])), int(match[4] or 2))
+    try:
+        domain, problem = on_grid(name, make(int(match[2]), int(match[3])), int(match[4] or 2))
+    except (UsageError, ValueError) as error:
+        raise SystemExit(f"there is no row {name}: {error}") from None
     return all_pairs(domain, [problem], ModelOptions(asynchronous=asynchronous))
 
 
