@@ -131,7 +131,8 @@ def choices(files: Arguments, options: ChoicesOptions) -> RobotsChoices:
 
 
 def _numbers(used: TaskLanguage, whose: str | Sequence[str]) -> tuple[int, ...]:
-    return tuple(dict.fromkeys(map(used.robot_number, names_in("--robot", whose))))
+    names = names_in("--robot", whose, used.model.robots)
+    return tuple(dict.fromkeys(map(used.robot_number, names)))
 
 
 def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:

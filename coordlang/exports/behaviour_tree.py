@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -23,6 +24,8 @@ from coordlang.execution.choices import RobotChoices, SentenceChoices
 from planners.grounding.actions import GroundAction
 from planners.joint.model import IDLE, JointModel
 from planners.pddl.formula_tree import required_atoms
+from planners.system.errors import UsageError
+from planners.system.messages import echoed
 
 
 class _Leaf(NamedTuple):
@@ -61,19 +64,24 @@ _LEAVES = {
 #: What a robot may do in a state of its automaton: the state, a label, and the state after it.
 _Move = tuple[int, int, int]
 
+#: What BehaviorTree.CPP refuses in an ID.
+_FORBIDDEN = re.compile(r"""[<>&"'/\\:*?|.]""")
+
 
 def behaviour_trees(choices: SentenceChoices) -> str:
     """All robots' choices as one XML document.
 
     Each robot's tree can do exactly the robot's subplans: for every one of them there is one way to
-    answer the ``Chooses`` with which the tree does it.  Linear in the automata.
+    answer the ``Chooses`` with which the tree does it.  Linear in the automata.  Raises
+    `UsageError` for a name that BehaviorTree.CPP takes for something else.
     """
     model = choices.task_language.model
-    root = ET.Element("root", BTCPP_format="4", main_tree_to_execute=model.robots[0])
+    root = ET.Element("root", BTCPP_format="4")
     root.append(ET.Comment(_comment(choices)))
     for own in choices.robots:
         root.append(_tree(model, own))
     root.append(_models(model, choices))
+    _set_ids(root, model)
     ET.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
@@ -208,3 +216,28 @@ def _leaf_model(kind: str, name: str, ports: Sequence[str]) -> ET.Element:
     for port in ports:
         ET.SubElement(found, "input_port", name=port)
     return found
+
+
+def _set_ids(root: ET.Element, model: JointModel) -> None:
+    """Give each tree and each action an ID of its own that BehaviorTree.CPP takes.
+
+    Most have their names already.
+    """
+    texts = chain.from_iterable(own[1:] for own in model.in_step.labels)
+    named = {("Action", text.strip("()").split()[0]) for text in texts}
+    named |= {("BehaviorTree", robot) for robot in model.robots}
+    ids: dict[tuple[str, str], str] = {}
+    for kind, name in sorted(named, key=lambda own: (bool(_FORBIDDEN.search(own[1])), own)):
+        ids[kind, name] = _FORBIDDEN.sub("_", name)
+        while [*ids.values(), "root"].count(ids[kind, name]) > 1:
+            ids[kind, name] += "_"
+    root.set("main_tree_to_execute", ids["BehaviorTree", model.robots[0]])
+    for node in root.iter():
+        if own_id := ids.get((node.tag, node.get("ID", ""))):
+            node.set("ID", own_id)
+        for port, value in node.items():
+            if port not in ("ID", "name") and re.fullmatch(r"\{.+\}", value):
+                raise UsageError(
+                    f"--to bt: in a behaviour tree {echoed(value)} is an entry of a blackboard",
+                    remedy="Rename the object.",
+                )

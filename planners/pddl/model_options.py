@@ -45,7 +45,8 @@ class ModelOptions:
     recorded: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "robots", names_in("--robots", self.robots))
+        whole = self.robots if self.recorded else ()
+        object.__setattr__(self, "robots", names_in("--robots", self.robots, whole))
         if self.robot_type is not None:
             if not self.robot_type.strip():
                 raise UsageError(
@@ -104,13 +105,16 @@ class ModelOptions:
             )
 
 
-def names_in(spelling: str, given: str | Sequence[str]) -> tuple[str, ...]:
+def names_in(
+    spelling: str, given: str | Sequence[str], whole: Sequence[str] = ()
+) -> tuple[str, ...]:
     """The names that an option is given, in texts with commas, in lower case.
 
-    Raises `UsageError` for texts without a name.
+    Names in ``whole`` may have commas.  Raises `UsageError` for texts without a name.
     """
     texts = [given] if isinstance(given, str) else given
-    names = [name.strip().lower() for text in texts for name in text.split(",") if name.strip()]
+    parts = [part for text in texts for part in ([text] if text in whole else text.split(","))]
+    names = [part.strip().lower() for part in parts if part.strip()]
     if not names and given != ():
         raise UsageError(f"{spelling}: expected names", remedy=f"As in {spelling} r1,r2.")
     return tuple(names)

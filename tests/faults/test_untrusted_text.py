@@ -43,7 +43,7 @@ MARKUP = (
 )
 WORDS = (
     *("define", "domain", "either-or", "number", "increase", "=x", "total-cost", "__proto__"),
-    *("constructor", "x_y", "x.y", "x,y", "\u00e9\u540d\u2603"),
+    *("x,y", "x_y", "x.y", "constructor", "\u00e9\u540d\u2603"),
 )
 NAMES: dict[str, dict[str, str]] = {
     "plain": {},

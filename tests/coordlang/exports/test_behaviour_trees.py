@@ -7,6 +7,7 @@ The XML of BehaviorTree.CPP 4 is read as its documentation describes the nodes t
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -18,16 +19,22 @@ import py_trees
 import pytest
 from py_trees.common import Status
 
+from benchmarks.paper.task_choices import languages_in_tasks
+from coordlang.commands.building import build_language
 from coordlang.execution.choices import choices
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
+from coordlang.language.candidates import from_problems
 from coordlang.language.words import Partition
 from planners.joint.model import IDLE, JointModel
 from planners.search.plans import Plan
+from planners.system.errors import UsageError
 from tests.support import naive
 from tests.support.asynchronous import Event, World, random_plans, texts
+from tests.support.domains import files_of
 from tests.support.naive_choices import listed
 from tests.support.task_languages import in_words, random_task_languages, shipped
+from tests.support.texts import parsed
 
 #: Shipped problems: two and three robots, shared actions, conditional choices, joint-action PDDL.
 WORLDS = [
@@ -118,15 +125,6 @@ class Team:
     def tree(self, robot: int, fails: str = "") -> py_trees.trees.BehaviourTree:
         """That of one robot; its action ``fails`` if it is named."""
 
-        def awaits(ports: Mapping[str, str]) -> Status:
-            return Status.SUCCESS if int(ports["step"]) <= self.step else Status.RUNNING
-
-        def chooses(ports: Mapping[str, str]) -> Status:
-            return status(ports["subaction"] == self.wanted[robot])
-
-        def holds(ports: Mapping[str, str]) -> Status:
-            return status(ports["fact"] in self.true)
-
         def acts(ports: Mapping[str, str]) -> Status:
             _, *arguments = ports["subaction"].strip("()").split()
             assert [ports[f"arg{n}"] for n in range(len(arguments))] == arguments
@@ -139,9 +137,13 @@ class Team:
             self.done[robot] = ports["subaction"]
             return Status.SUCCESS
 
-        return read_tree(
-            self.xml, self.model, robot, acts, AwaitStep=awaits, Chooses=chooses, Holds=holds
-        )
+        running = {True: Status.SUCCESS, False: Status.RUNNING}
+        leaves: dict[str, Leaf] = {
+            "AwaitStep": lambda ports: running[int(ports["step"]) <= self.step],
+            "Chooses": lambda ports: status(ports["subaction"] == self.wanted[robot]),
+            "Holds": lambda ports: status(ports["fact"] in self.true),
+        }
+        return read_tree(self.xml, self.model, robot, acts, **leaves)
 
     def run(self, plan: Plan, states: list[frozenset[str]]) -> None:
         """Each robot wants its part of the plan, and does it."""
@@ -192,13 +194,35 @@ def test_every_mixture_of_random_models(robots: int) -> None:
     assert several >= 2
 
 
-@pytest.mark.parametrize("words", [("-", "---", "w--"), ("w0", "a--b<&", "w2")])
-def test_names_of_words_that_xml_would_misread(words: tuple[str, str, str]) -> None:
-    """Two hyphens end a comment, and a word may have any name."""
-    _, used = shipped("three-cells/problem")
+#: Other names in the three cells, and then the IDs of the trees and of the leaf; none: refused.
+NAMES: list[tuple[dict[str, str], list[str]]] = [
+    ({"w0": "-", "w1": "---", "w2": "w--"}, ["r1", "r2", "move"]),
+    ({"w1": "a--b<&"}, ["r1", "r2", "move"]),
+    ({"r1": "a.b", "r2": "a_b", "move": "a/b"}, ["a_b__", "a_b", "a_b_"]),
+    ({"r1": "move", "r2": "root"}, ["move_", "root_", "move"]),
+    ({"a": "{a}"}, []),
+]
+
+
+@pytest.mark.parametrize(("names", "ids"), NAMES)
+def test_names_that_readers_would_misread(names: dict[str, str], ids: list[str]) -> None:
+    """Two hyphens end a comment; IDs are of few characters, and apart; braces: a blackboard."""
+    texts = (path.read_text() for path in files_of("three-cells"))
+    files = (re.sub(r"\w+", lambda name: names.get(name[0], name[0]), text) for text in texts)
+    domain, problem = parsed(*files)
+    candidates = from_problems(domain, [problem])
+    used = next(languages_in_tasks(build_language(candidates, "greedy").language, candidates))
+    words = tuple(names.get(word, word) for word in used.partition.words)
     used = replace(used, partition=replace(used.partition, words=words))
-    said = used.words_of(f"{words[1]} {words[0]}")
-    assert ET.fromstring(behaviour_trees(choices(used, said))).tag == "root"
+    found = choices(used, (1, 0))
+    if not ids:
+        with pytest.raises(UsageError, match="an entry of a blackboard"):
+            behaviour_trees(found)
+        return
+    root = ET.fromstring(behaviour_trees(found))
+    assert [tree.get("ID") for tree in root.iter("BehaviorTree")] == ids[:2]
+    assert root.get("main_tree_to_execute") == ids[0]
+    assert {node.get("ID") for node in root.iter("Action")} == {"AwaitStep", ids[2]}
 
 
 @pytest.mark.parametrize("fails", [False, True])

@@ -196,24 +196,19 @@ def test_what_each_planner_reads(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("cost", "most", "reader", "message"),
     [
-        (
-            {"cost": "makespan+actions", "for_planner": "pyperplan"},
-            "--for pyperplan writes no costs",
-        ),
-        ({"for_planner": "metric-ff"}, "--for metric-ff"),
+        ("makespan+actions", 2000, "pyperplan", "--for pyperplan writes no costs"),
+        ("makespan", 0, "pyperplan", "every joint action must be one action"),
+        ("makespan", 2000, "metric-ff", "--for metric-ff"),
     ],
 )
-def test_what_strips_cannot_say(options: dict[str, Any], message: str) -> None:
+def test_what_strips_cannot_say(
+    cost: str, most: int, reader: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", most)
     with pytest.raises(UsageError, match=message):
-        export("grid/corners-3x3", **options)
-
-
-def test_strips_needs_an_action_for_each_joint_action(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", 0)
-    with pytest.raises(UsageError, match="every joint action must be one action"):
-        export("grid/corners-3x3", for_planner="pyperplan")
+        export("grid/corners-3x3", cost, for_planner=reader)
 
 
 @EACH
