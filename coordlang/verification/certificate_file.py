@@ -45,7 +45,13 @@ class Reason(msgspec.Struct, frozen=True):
     """
 
     init: Annotated[list[str], doc("The fluents that are true at the start, as PDDL atoms.")]
-    goal: Annotated[list[str], doc("PDDL literals or formulas that must all hold at the end.")]
+    goal: Annotated[
+        list[str],
+        doc(
+            "PDDL literals or formulas that must all hold at the end; with --tasks all the "
+            "fluents that are true there, and no others are."
+        ),
+    ]
     plans: Annotated[
         list[PlanTexts],
         doc("Optimal plans, one for each robot: its subactions by step, null for idling."),
