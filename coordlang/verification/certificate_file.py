@@ -120,7 +120,7 @@ class Cnf:
             clause
             for own in self.word.values()
             for clause in (own, *((-a, -b) for a, b in combinations(own, 2)))
-        ]
+        ] or [()] * (not size)  # there is some state, and it has a word
         apart = [
             (-variable, -x, -y)
             for (a, b), variable in self._separated.items()

@@ -96,7 +96,7 @@ def check(
     # no formula, which a number of a million words would make large.
     is_open = certificate.refuted >= max(1, len(states_of(clauses))) and all(clauses)
     cnf = None if is_open else Cnf(clauses, certificate.refuted)
-    if cnf is None or (certificate.refuted and not cnf.refuted()):
+    if cnf is None or not cnf.refuted():
         raise Refuted(
             f"the certificate's {len(certificate.reasons):,} reasons leave languages "
             f"with {certificate.refuted} words",

@@ -195,7 +195,7 @@ def test_nothing_to_refute() -> None:
         refuting_clauses(built.job, 3)
     with pytest.raises(ValueError, match="leave a partition into 1 words"):
         core([], 1)
-    assert Cnf([frozenset({(0, 1)})], 1).refuted()
+    assert all(Cnf(*own).refuted() for own in (([frozenset({(0, 1)})], 1), ([], 0)))
     assert not Cnf([frozenset({(0, 1)})], 2).refuted()
 
 
