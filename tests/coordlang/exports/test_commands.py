@@ -18,13 +18,12 @@ import coordlang as door
 from coordlang.commands.export import ExportedTask
 from planners.classical.fast_downward import total_cost
 from planners.classical.task import action_names
-from planners.pddl import parse_domain, parse_problem
-from planners.pddl.sexpr import Source
 from planners.system.errors import UsageError
 from tests.support.command import Command, Outcome
 from tests.support.domains import T_MAP, files_of
 from tests.support.naive_classical import optimal_plans
 from tests.support.task_languages import SHIPPED
+from tests.support.texts import parsed
 
 #: A sentence of the least language of the T-map, and one of the task of three cells.
 SENTENCE, OF_CELLS = "w0 w2 w1 w0", "w1 w0"
@@ -160,11 +159,7 @@ EACH = pytest.mark.parametrize("name", WORLDS)
 @cache
 def built(name: str, cost: str = "makespan") -> tuple[Any, Any, str, int]:
     """Files, language, a sentence of its task, and how many plans have it."""
-    if name == "lift":
-        domain: Any = parse_domain(Source("d.pddl", LIFT))
-        files: Any = domain, parse_problem(Source("p.pddl", BOTH), domain)
-    else:
-        files = files_of(*name.split("/"))
+    files: Any = parsed(LIFT, BOTH) if name == "lift" else files_of(*name.split("/"))
     language = door.build(*files, cost=cost, method="greedy").language
     sentence = " ".join(door.explain(language, *files).sentences[0].words)
     return files, language, sentence, door.understand(language, *files, sentence).count
