@@ -20,7 +20,8 @@ import numpy as np
 from coordlang.explanation.variables import valuation
 from coordlang.explanation.words import MappedStates, all_covers
 from coordlang.vocabulary.job import Assignment, Job, Outcome
-from coordlang.vocabulary.loop import Budget, Languages, close_bounds
+from coordlang.vocabulary.languages import Languages
+from coordlang.vocabulary.loop import Budget, close_bounds
 from coordlang.vocabulary.sat import (
     PartitionProblem,
     Undecided,

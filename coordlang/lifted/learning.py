@@ -31,7 +31,7 @@ from coordlang.required.miscoordination import Inseparable
 from coordlang.sites.coordinates import Point
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.verification.by_definition import inseparable, verify_candidates
-from coordlang.vocabulary.refuter import Refuter
+from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
 from planners.joint.tables import Bools, Ints
 from planners.parallel.workers import Workers
@@ -273,11 +273,11 @@ class _Taken:
         self.own = own
         self.clauses: dict[Clause, None] = {}
         self.table: Ints = np.zeros((0, 0), np.int64)
-        self._refuter = Refuter(spaces, group, rows, seed, progress, refuted)
+        self._languages = Languages(spaces, group, rows, seed, progress, refuted)
 
     def violated(self, words: Ints) -> Collection[Clause]:
         """Clauses that words of the states violate; none if they are a language here."""
-        found = self._refuter.violated(words)
+        found = self._languages.violated(words)
         self.clauses.update(dict.fromkeys(found))
         return found.keys()
 

@@ -22,8 +22,8 @@ from coordlang.language.warping import Clause
 from coordlang.symmetry.graph import Renaming, joined_order
 from coordlang.symmetry.group import SymmetryGroup, symmetries_of_part
 from coordlang.vocabulary.job import Evidence
-from coordlang.vocabulary.loop import Budget, Languages, Partitions, find
-from coordlang.vocabulary.refuter import Refuter, ends
+from coordlang.vocabulary.languages import Languages, ends
+from coordlang.vocabulary.loop import Budget, Partitions, find
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 
@@ -56,7 +56,7 @@ class ContainedInstance:
     @cached_property
     def languages(self) -> Languages:
         """What is known of its languages."""
-        return Languages(Refuter([self.space], self.group, len(self.space.rows), self.seed))
+        return Languages([self.space], self.group, len(self.space.rows), self.seed)
 
     @cached_property
     def _partitions(self) -> Partitions:

@@ -78,20 +78,16 @@ class FailingTuples:
         low, high = _different_part(states)
         once = _once(states)
         shapes, shape_of = unique_rows(np.column_stack((high - low, once.sum(axis=1))))
-        batch, kept = [np.zeros(0, np.int64)], 0
+        before = len(self)
         for number, (length, plans) in enumerate(shapes.tolist()):
             rows = np.flatnonzero(shape_of == number)
             cells = low[rows, None] + np.arange(length)
             different = states[rows][once[rows]].reshape(len(rows), plans, -1)
             different = np.take_along_axis(different, cells[:, None, :], axis=2)
             fresh = self._new(different)
-            here = np.arange(kept, kept + len(fresh))
-            kept += len(fresh)
-            batch.append(rows[fresh])
-            source = np.column_stack((np.full(len(fresh), len(self._batches)), here))
-            self._append((length, plans), different[fresh], source)
-        self._batches.append((space, edges[np.concatenate(batch)]))
-        return kept
+            self._append((length, plans), different[fresh], len(self._batches))
+            self._batches.append((space, edges[rows[fresh]]))
+        return len(self) - before
 
     def agreeing(
         self, word: Ints, images: Sequence[Ints] | None = None, enough: int = sys.maxsize
@@ -184,9 +180,10 @@ class FailingTuples:
         self._keys = np.concatenate((self._keys, keys[fresh]))
         return np.sort(first[fresh])
 
-    def _append(self, shape: Shape, states: Ints, source: Ints) -> None:
+    def _append(self, shape: Shape, states: Ints, batch: int) -> None:
         if not len(states):
             return
+        source = np.column_stack((np.full(len(states), batch), np.arange(len(states))))
         by_step = states.transpose(2, 1, 0)
         if shape in self.by_shape:
             by_step = np.concatenate((self.by_shape[shape], by_step), axis=2)

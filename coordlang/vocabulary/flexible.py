@@ -20,8 +20,8 @@ from coordlang.language.sentences import MANY, Flexibility
 from coordlang.required.choices import Choices
 from coordlang.required.plan_table import PlanTable
 from coordlang.vocabulary.job import Assignment, Job, Outcome
+from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.local_search import WORK, LocalSearch
-from coordlang.vocabulary.loop import Languages
 from planners.joint.tables import Floats, Ints
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts

@@ -17,7 +17,7 @@ from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 
 if TYPE_CHECKING:
-    from coordlang.vocabulary.loop import Languages
+    from coordlang.vocabulary.languages import Languages
 
 #: A partition while it is looked for: state number -> word number.
 Assignment = Mapping[int, int]

@@ -10,14 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isqrt
 from typing import Generic, TypeVar
 
 from coordlang.language.warping import Clause
-from coordlang.symmetry.group import symmetry_group
-from coordlang.vocabulary.job import Assignment, Evidence, Job, words_of_states
-from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import (
     PartitionProblem,
     Undecided,
@@ -32,45 +29,6 @@ Requirement = TypeVar("Requirement")
 
 #: A problem starts afresh when it has so many times the requirements that it started with.
 _GROWTH = 2
-
-
-class Languages:
-    """Partitions looked at one after another: each is a language, or gives clauses.
-
-    ``refuter`` tells what is wrong with a partition.  ``clauses`` are those that every language
-    satisfies, in the order in which they were met and with their images under the symmetries
-    ``group``: a list that only grows.  ``evidence`` says why each is necessary.  ``rounds`` counts
-    the partitions looked at.
-    """
-
-    def __init__(self, refuter: Refuter) -> None:
-        self.refuter, self.group = refuter, refuter.pool.group
-        self.clauses: list[Clause] = []
-        self.evidence: dict[Clause, Evidence] = {}
-        self.rounds = 0
-
-    @classmethod
-    def of(cls, job: Job) -> Languages:
-        """The languages for the candidate tasks of a job."""
-        spaces, states = job.candidates.spaces, len(job.candidates.rows)
-        group = symmetry_group(job.candidates)
-        return cls(Refuter(spaces, group, states, job.seed, job.progress))
-
-    def holds(self, partition: Assignment) -> bool:
-        """Whether it is a language; if not, the clauses that it violates are known afterwards."""
-        self.rounds += 1
-        violated = self.refuter.violated(words_of_states(partition, self.refuter.pool.states))
-        for clause in without_implied(violated):
-            evidence = violated[clause]
-            self._add(clause, evidence)
-            for image, symmetry in self.group.images(clause):
-                self._add(image, replace(evidence, symmetry=symmetry))
-        return not violated
-
-    def _add(self, clause: Clause, evidence: Evidence) -> None:
-        if clause not in self.evidence:
-            self.evidence[clause] = evidence
-            self.clauses.append(clause)
 
 
 @dataclass(frozen=True, slots=True)

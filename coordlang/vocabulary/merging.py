@@ -15,7 +15,7 @@ import numpy as np
 
 from coordlang.vocabulary.failing_tuples import FailingTuples, Shape, sequences_agree
 from coordlang.vocabulary.job import Assignment, words_of_states
-from coordlang.vocabulary.refuter import Refuter
+from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints
 
@@ -26,7 +26,7 @@ _TOGETHER = 100_000
 
 
 def merged(
-    language: Assignment, states: Sequence[int], refuter: Refuter
+    language: Assignment, states: Sequence[int], languages: Languages
 ) -> Iterator[dict[int, int]]:
     """Languages with fewer and fewer words, made from each other by merging words.
 
@@ -35,10 +35,10 @@ def merged(
     takes too long to decide is left for later, and then given twice the work.  Of the last language
     no two words can be merged.  The best one so far comes after each search.
 
-    ``language`` is the one to begin with, ``states`` are those that need words, and ``refuter``
-    tells what is wrong with a partition.
+    ``language`` is the one to begin with, ``states`` are those that need words, and
+    ``languages`` tells what is wrong with a partition.
     """
-    mine, pool = np.array(states), refuter.pool
+    mine, pool = np.array(states), languages.pool
     word = words_of_states(language, pool.states)
     _, word[mine] = np.unique(word[mine], return_inverse=True)
     closed, left = forbidden_merges(pool, word, {}), False
@@ -56,7 +56,7 @@ def merged(
             continue
         known = {shape: own.shape[2] for shape, own in pool.by_shape.items()}
         try:
-            holds = not refuter.agreeing(trial, None, 1, steps)
+            holds = not languages.agreeing(trial, None, 1, steps)
         except Undecided:
             holds = False
             if merges == 1 and pair is not None:

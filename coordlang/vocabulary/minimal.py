@@ -21,24 +21,18 @@ from typing import TYPE_CHECKING
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
-from coordlang.vocabulary.loop import (
-    Budget,
-    Languages,
-    Partitions,
-    between,
-    close_bounds,
-    find,
-)
+from coordlang.vocabulary.languages import Languages
+from coordlang.vocabulary.loop import Budget, Partitions, between, close_bounds, find
 from coordlang.vocabulary.merging import merged
+from coordlang.vocabulary.one_task import OneTask
 from coordlang.vocabulary.sat import Undecided
+from coordlang.vocabulary.tied_words import TiedWords
 from planners.search.sat import SolverName
 from planners.system.errors import OutOfMemory
 from planners.system.limits import run_until_stopped
 
-if TYPE_CHECKING:  # they load networkx
+if TYPE_CHECKING:  # it loads networkx
     from coordlang.vocabulary.contained import ContainedInstance
-    from coordlang.vocabulary.one_task import OneTask
-    from coordlang.vocabulary.tied_words import TiedWords
 
 #: A thousand conflicts are a unit of effort; a refuted partition counts as so many ..
 _UNIT, _ROUND = 1_000, 250
@@ -155,15 +149,11 @@ class MinimalSearch:
 
     @cached_property
     def _tied(self) -> TiedWords:
-        from coordlang.vocabulary.tied_words import TiedWords
-
         return TiedWords(self._job, self.languages)
 
     @cached_property
     def _one_task(self) -> OneTask | None:
         """Who asks for all pairs of plans of one task; None where clauses must prove it."""
-        from coordlang.vocabulary.one_task import OneTask
-
         if self._job.by_clauses or not self._is_one_task:
             return None
         return OneTask(
@@ -260,11 +250,9 @@ class MinimalSearch:
         if "languages" not in self.__dict__:
             return 0
         rounds = self.languages.rounds + self._merges // _MERGES
-        conflicts = self._partitions.conflicts
-        if "_tied" in self.__dict__:
-            conflicts += self._tied.conflicts
-        if (one_task := self.__dict__.get("_one_task")) is not None:
-            conflicts += one_task.work
+        conflicts = self._partitions.conflicts + self._tied.conflicts
+        if self._one_task is not None:
+            conflicts += self._one_task.work
         return conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
 
     @property
@@ -289,7 +277,7 @@ class MinimalSearch:
         if self.best is None or self.upper <= self.lower:
             return
         if self._merging is None or self._merging[0] is not self.best:
-            self._merging = self.best, merged(self.best, self._job.states, self.languages.refuter)
+            self._merging = self.best, merged(self.best, self._job.states, self.languages)
         coarsest, failed = self.best, 0
         for number, coarser in enumerate(self._merging[1], 1):
             failed += 1
@@ -409,8 +397,8 @@ class MinimalSearch:
                 "rounds": languages.rounds,
                 "clauses": len(languages.clauses),
                 "symmetries": len(languages.group.symmetries),
-                "counterexamples": len(languages.refuter.pool),
-                "walks": languages.refuter.walks,
+                "counterexamples": len(languages.pool),
+                "walks": languages.walks,
                 "work": self.work,
             }
             if self.lower == 2:  # any clause refutes one word

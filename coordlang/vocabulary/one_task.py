@@ -20,7 +20,8 @@ import numpy as np
 
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.job import Assignment, Job
-from coordlang.vocabulary.loop import Budget, Languages, between, find
+from coordlang.vocabulary.languages import Languages
+from coordlang.vocabulary.loop import Budget, between, find
 from coordlang.vocabulary.plan_pairs import PlanPairs
 from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.two_words import TwoWords

@@ -18,7 +18,8 @@ from itertools import count
 
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.job import Assignment, Job, Outcome
-from coordlang.vocabulary.loop import Budget, Languages, ProblemsBySize, close_bounds, find
+from coordlang.vocabulary.languages import Languages
+from coordlang.vocabulary.loop import Budget, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import (
     PartitionProblem,
     Undecided,

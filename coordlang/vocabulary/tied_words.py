@@ -19,8 +19,8 @@ import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.vocabulary.job import Assignment, Job, words_of_states
-from coordlang.vocabulary.loop import Budget, Languages, find
-from coordlang.vocabulary.refuter import Refuter
+from coordlang.vocabulary.languages import Languages
+from coordlang.vocabulary.loop import Budget, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.graphs import parts_of_graph
@@ -56,9 +56,8 @@ class TiedWords:
 
     def __init__(self, job: Job, languages: Languages) -> None:
         self._states, self._languages = np.array(job.states), languages
-        self._refuter = languages.refuter
         self._random = np.random.default_rng(job.seed)
-        self._images = languages.refuter.pool.images
+        self._images = languages.pool.images
         self._is_one_task = job.candidates.count == 1
         self._first = _OF_ONE if self._is_one_task else _OF_MANY
         #: What there may be in common, kind by kind; each size goes through a copy of it.
@@ -78,7 +77,7 @@ class TiedWords:
         For one task: as few facts as possible decide it, then more and more.
         """
         if self._is_one_task:
-            yield from map(_Ties, classes_by_facts(job.candidates, self._refuter))
+            yield from map(_Ties, classes_by_facts(job.candidates, self._languages))
         else:  # these load networkx
             from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 
@@ -148,11 +147,11 @@ class TiedWords:
 
         def holds(partition: Assignment) -> bool:
             word = words_of_states(partition, len(kind.first))[kind.first]
-            agreeing = self._refuter.agreeing(word, kind.images, _ENOUGH)
+            agreeing = self._languages.agreeing(word, kind.images, _ENOUGH)
             if agreeing:
                 kind.rounds += 1
                 self._languages.rounds += 1
-                codes = self._refuter.pool.codes(word, agreeing, _AT_ONCE, self._random)
+                codes = self._languages.pool.codes(word, agreeing, _AT_ONCE, self._random)
                 kind.ties.clauses.append(codes)
                 kind.require_clauses()
             return not agreeing
@@ -226,7 +225,7 @@ def _orbits(to: Ints) -> Ints:
 # ---- few facts that decide the words of one task
 
 
-def classes_by_facts(candidates: Candidates, refuter: Refuter) -> Iterator[Ints]:
+def classes_by_facts(candidates: Candidates, languages: Languages) -> Iterator[Ints]:
     """(states) the class of each state: what some facts say of it, and how many steps are to go.
 
     Each class a word of its own is a language.  At first the class is decided by facts of which
@@ -237,7 +236,7 @@ def classes_by_facts(candidates: Candidates, refuter: Refuter) -> Iterator[Ints]
     such classes iff they are in one class after each step, so that nothing else tells them apart
     (Proposition 28 of docs/concepts.md).
 
-    ``candidates``: one task.  ``refuter``: tells what is wrong with a partition.
+    ``candidates``: one task.  ``languages``: tells what is wrong with a partition.
     """
     (space,) = candidates.spaces
     steps = np.full(len(space.rows), -1)
@@ -246,21 +245,23 @@ def classes_by_facts(candidates: Candidates, refuter: Refuter) -> Iterator[Ints]
         return
     facts, chosen = _changing_facts(candidates), list[int]()
     left = np.ones(len(facts), np.bool_)
-    while (found := _deciding(facts, left, steps, refuter)) is not None:
+    while (found := _deciding(facts, left, steps, languages)) is not None:
         left[found] = False
         chosen += found
         yield _classes(steps, facts[chosen])
 
 
-def _deciding(facts: Bools, left: Bools, steps: Ints, refuter: Refuter) -> list[int] | None:
+def _deciding(facts: Bools, left: Bools, steps: Ints, languages: Languages) -> list[int] | None:
     """Facts that suffice, of those that are ``left``, by number; None if all do not."""
     from pysat.examples.hitman import Hitman
 
     with whole(Hitman)(htype="lbx") as hitting:
         chosen: list[int] = []
-        while agreeing := refuter.agreeing(_classes(steps, facts[chosen]), None, _ENOUGH_FOR_FACTS):
+        while agreeing := languages.agreeing(
+            _classes(steps, facts[chosen]), None, _ENOUGH_FOR_FACTS
+        ):
             for found in agreeing:
-                sequences = refuter.pool.sequences(found, found.rows[:_ENOUGH_FOR_FACTS])
+                sequences = languages.pool.sequences(found, found.rows[:_ENOUGH_FOR_FACTS])
                 for differing in _differing(facts, sequences):
                     if not (differing & left).any():
                         return None

@@ -20,8 +20,8 @@ from coordlang.verification.certificate_file import Certificate, Reason
 from coordlang.verification.check_certificate import Checked, check
 from coordlang.verification.make_certificate import _reason
 from coordlang.vocabulary.contained import ContainedInstance, part_of, parts, tasks_of_one_orbit
+from coordlang.vocabulary.languages import ends
 from coordlang.vocabulary.loop import Budget
-from coordlang.vocabulary.refuter import ends
 from planners.joint.tables import Bools
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan

@@ -21,8 +21,8 @@ from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.failing_tuples import FailingTuples
 from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.merging import merged
-from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem
 from tests.support.candidates import small_candidates, states_of
 from tests.support.domains import all_tasks
@@ -126,10 +126,10 @@ def merges(word: Assignment) -> Iterator[dict[int, int]]:
 def languages(candidates: Candidates, group: SymmetryGroup) -> list[dict[int, int]]:
     """Those that merging goes through, from all states apart."""
     states = states_of(candidates)
-    refuter = Refuter(candidates.spaces, group, len(candidates.rows), 0)
+    languages = Languages(candidates.spaces, group, len(candidates.rows), 0)
     start = {state: 2 * number for number, state in enumerate(states)}
     found = [start]
-    for language in merged(start, states, refuter):
+    for language in merged(start, states, languages):
         if len(set(language.values())) < len(set(found[-1].values())):
             found.append(language)
     return found
@@ -183,7 +183,7 @@ def test_walks_of_goals_up_to_symmetry_refute_what_is_no_language(folder: str, s
     group = symmetry_group(candidates)
     assert group.symmetries
     states = range(len(candidates.rows))
-    refuter = Refuter(candidates.spaces, group, len(states), 0)
+    languages = Languages(candidates.spaces, group, len(states), 0)
     random, answers = Random(1), Counter[bool]()
     for _ in range(40):
         word = list(states)
@@ -192,7 +192,7 @@ def test_walks_of_goals_up_to_symmetry_refute_what_is_no_language(folder: str, s
             word = [word[other] if w == word[one] else w for w in word]
         partition = Partition.of_states(candidates.rows, dict(enumerate(word)))
         holds = verify(partition, candidates.spaces).holds
-        refuter.pool = FailingTuples(group, len(states))  # it knows nothing, and has to walk
-        assert (not refuter.violated(np.array(word))) == holds
+        languages.pool = FailingTuples(group, len(states))  # it knows nothing, and has to walk
+        assert (not languages.violated(np.array(word))) == holds
         answers[holds] += 1
     assert min(answers.values()) >= 5, answers

@@ -21,7 +21,8 @@ from coordlang.language.candidates import Candidates, from_problems
 from coordlang.language.warping import Pair, pair
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.job import Job
-from coordlang.vocabulary.loop import Budget, Languages, find
+from coordlang.vocabulary.languages import Languages
+from coordlang.vocabulary.loop import Budget, find
 from coordlang.vocabulary.minimal import MinimalSearch
 from coordlang.vocabulary.plan_pairs import PlanPairs
 from coordlang.vocabulary.sat import END, START, Undecided

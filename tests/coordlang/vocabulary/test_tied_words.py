@@ -25,7 +25,8 @@ from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from coordlang.vocabulary.first_differences import first_differences
 from coordlang.vocabulary.job import Assignment, Job
-from coordlang.vocabulary.loop import Budget, Languages
+from coordlang.vocabulary.languages import Languages
+from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.sat import PartitionProblem
 from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits, _Ties, classes_by_facts
 from planners.joint.tables import Ints
@@ -202,7 +203,7 @@ def classes(candidates: Candidates) -> list[Ints]:
     """All of them, coarse ones first."""
     found = first_differences(candidates.spaces, most=0)
     languages = Languages.of(Job(candidates, tuple(found.states.tolist()), found))
-    return list(classes_by_facts(candidates, languages.refuter))
+    return list(classes_by_facts(candidates, languages))
 
 
 def test_one_fact_decides_who_goes_round() -> None:

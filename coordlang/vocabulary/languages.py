@@ -1,25 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Failing plans that a partition does not tell apart: those known, and by walks where none is.
+"""Is a partition a language?  If not, plans that fail and are not told apart give clauses.
 
-Every search for partitions asks it, and each profits from what the others met.
+Every search for partitions asks it, and each profits from what the others met.  Plans are looked
+for by walks where none that are known refute the partition.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from random import Random
 
 import numpy as np
 
 from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
-from coordlang.symmetry.group import SymmetryGroup
+from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
 from coordlang.vocabulary.counterexamples import Mixtures
 from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
-from coordlang.vocabulary.job import Evidence
+from coordlang.vocabulary.job import Assignment, Evidence, Job, words_of_states
+from coordlang.vocabulary.sat import without_implied
 from planners.joint.model import FullState
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
@@ -59,15 +61,18 @@ class _Walked:
         return self.finder.failing(word[self.space.state], most, len(self.images), steps)
 
 
-class Refuter:
-    """Decides whether partitions are languages, and keeps what refutes them.
+class Languages:
+    """Partitions looked at one after another: each is a language, or gives clauses.
 
     Of goals that are images of each other under a symmetry one is walked: a partition is refuted
     by plans of the tasks to an image iff its image under the symmetry is refuted by plans of the
     tasks to the goal itself.  At the beginning plans are collected that refute the partition
     ``first``, by default a single word, where walks are longest.
 
-    ``pool``: the failing tuples met so far.  ``walks``: how often a part of the tasks was walked.
+    ``clauses`` are those that every language satisfies, in the order in which they were met and
+    with their images under the symmetries ``group``: a list that only grows.  ``evidence`` says why
+    each is necessary.  ``rounds`` counts the partitions looked at.  ``pool``: the failing tuples
+    met so far.  ``walks``: how often a part of the tasks was walked.
     """
 
     def __init__(
@@ -79,15 +84,39 @@ class Refuter:
         progress: Callable[[str], None] = lambda _: None,
         first: Ints | None = None,
     ) -> None:
-        self.pool = FailingTuples(group, states)
-        self.walks = 0
+        self.group, self.pool = group, FailingTuples(group, states)
+        self.clauses: list[Clause] = []
+        self.evidence: dict[Clause, Evidence] = {}
+        self.rounds = self.walks = 0
         self._random = np.random.default_rng(seed)
         self._parts = _parts(spaces, self.pool.images, Random(seed))
         word = np.zeros(states, np.int64) if first is None else first
         progress("collecting plans whose mixture fails")
         for walked in self._parts:
-            self._add(walked, walked.failing(word, _AT_FIRST))
+            self._keep(walked, walked.failing(word, _AT_FIRST))
             progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
+
+    @classmethod
+    def of(cls, job: Job) -> Languages:
+        """The languages for the candidate tasks of a job."""
+        spaces, states = job.candidates.spaces, len(job.candidates.rows)
+        return cls(spaces, symmetry_group(job.candidates), states, job.seed, job.progress)
+
+    def holds(self, partition: Assignment) -> bool:
+        """Whether it is a language; if not, the clauses that it violates are known afterwards."""
+        self.rounds += 1
+        violated = self.violated(words_of_states(partition, self.pool.states))
+        for clause in without_implied(violated):
+            evidence = violated[clause]
+            self._add(clause, evidence)
+            for image, symmetry in self.group.images(clause):
+                self._add(image, replace(evidence, symmetry=symmetry))
+        return not violated
+
+    def _add(self, clause: Clause, evidence: Evidence) -> None:
+        if clause not in self.evidence:
+            self.evidence[clause] = evidence
+            self.clauses.append(clause)
 
     def agreeing(
         self,
@@ -109,7 +138,7 @@ class Refuter:
                 break
             words = [word[self.pool.images[image]] for image in walked.images]
             different = {own.tobytes(): own for own in words}.values()
-            if any(self._add(walked, walked.failing(w, _LATER, steps)) for w in different):
+            if any(self._keep(walked, walked.failing(w, _LATER, steps)) for w in different):
                 known = self.pool.agreeing(word, images, enough)
                 assert known, "plans that a walk has found are known"
                 self._parts.insert(0, self._parts.pop(number))
@@ -119,8 +148,8 @@ class Refuter:
         """Necessary clauses of which a partition violates some image; none if it is a language."""
         return self.pool.clauses(word, self.agreeing(word, enough=_ENOUGH), self._random)
 
-    def _add(self, walked: _Walked, found: Sequence[Ints]) -> bool:
-        """Add what a walk has found; whether that is anything."""
+    def _keep(self, walked: _Walked, found: Sequence[Ints]) -> bool:
+        """Keep what a walk has found; whether that is anything."""
         self.walks += 1
         for table in found:
             self.pool.add(table, walked.space)
