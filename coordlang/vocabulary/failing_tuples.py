@@ -60,7 +60,7 @@ class FailingTuples:
     """
 
     def __init__(self, group: SymmetryGroup, states: int) -> None:
-        self.group, self.states = group, states
+        self.states = states
         self.images: list[Ints] = [np.arange(states), *(s.states for s in group.symmetries)]
         self.by_shape: dict[Shape, Ints] = {}
         #: Where the tuples of each shape come from (tuples, 2): number of a batch, row in it.

@@ -34,7 +34,7 @@ def separating(job: Job) -> Outcome:
     ``figures["separating_lower_bound"]`` is the proved bound on separating partitions; other
     languages may have fewer words.  Anytime, like `minimal`.
     """
-    search = _Alpha(job) if job.alpha_only else _AlphaOrBeta(job)
+    search = _Search(job)
     with closing(search.problems):
         stopped = run_until_stopped(search.run)
     if search.best is None:
@@ -43,20 +43,25 @@ def separating(job: Job) -> Outcome:
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
 
 
-class _Alpha:
-    """Closes in from below on the least number of words that satisfy alpha.
+class _Search:
+    """Closes in from below on the least number of words that satisfy alpha, or alpha or beta.
 
-    All constraints are listed: with two robots they are the edges of a graph to colour.  ``lower``
-    words are proved to be needed, ``best`` is separating (or the incumbent).
+    ``lower`` words are proved to be needed, ``best`` is separating (or the incumbent).  Constraints
+    are listed where they are few, so proofs are short: of alpha always.  Else those that a
+    partition breaks are found by walks, with their images under the model's symmetries.
     """
 
     def __init__(self, job: Job) -> None:
         self._job = job
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
-        #: The constraints that are listed, and states that need words of their own.
+        #: The constraints that are known, as a set, too, and states that need words of their own.
         self._known: list[Constraint] = []
+        self._met: set[Constraint] = set()
         self._apart: Sequence[int] = ()
+        self._walks: list[DifferenceWalk] = []
+        self._permutations: list[list[int]] = []
+        self._random = np.random.default_rng(job.seed)
         self.problems = ProblemsBySize(
             self._known, self._start, PartitionProblem.separate_all_of_one
         )
@@ -71,13 +76,16 @@ class _Alpha:
         if not self._job.first_differences.requiring:
             self.best = dict.fromkeys(self._job.states, 0)
             return
-        partition = self._prepare()
+        partition = self._prepare_alpha() if self._job.alpha_only else self._prepare()
         if partition is not None and word_count(partition) < self.upper:
             self._accept(partition)
         close_bounds(lambda: (self.lower, self.upper), self.decide)
 
-    def _prepare(self) -> Assignment | None:
-        """List the constraints; a partition that satisfies them, None if none was found."""
+    def _prepare_alpha(self) -> Assignment:
+        """List the constraints; a partition that satisfies them.
+
+        With two robots they are the edges of a graph to colour.
+        """
         states, known = self._job.states, self._known
         known += separations(self._job.first_differences.listed)
         edges = {p for c in known if len(c) == 1 for p in c[0]}
@@ -86,6 +94,23 @@ class _Alpha:
         if all(len(constraint) == 1 for constraint in known):
             return _dsatur(states, edges)
         return greedy_partition(most_constrained_first(states, [frozenset(edges)]), known)
+
+    def _prepare(self) -> Assignment | None:
+        """List the constraints if they are few; a separating partition, None if none was found."""
+        job = self._job
+        self._permutations = symmetry_group(job.candidates).permutations
+        job.progress("walking to the last differences")
+        self._walks = [DifferenceWalk(space) for space in job.candidates.spaces]
+        for walk in self._walks:
+            self._met.update(constraints(walk.every(_LISTED) or ()))
+        self._known += sorted(self._met, key=lambda c: [sorted(pairs) for pairs in c])
+        for _ in range(_GREEDY_ROUNDS):
+            partition = greedy_partition(self._most_constrained_first(), self._known)
+            broken = self._broken(partition)
+            if not broken:
+                return partition
+            self._known += broken
+        return None
 
     def decide(self, size: int, budget: Budget) -> bool:
         """Find a separating partition of a size, or prove that there is none; False: not yet."""
@@ -117,60 +142,6 @@ class _Alpha:
 
     def _broken(self, partition: Assignment) -> list[Constraint]:
         """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
-        return []
-
-    def _start(self, size: int) -> PartitionProblem:
-        # Naming the words of states that need words of their own first leaves fewest symmetries.
-        states = dict.fromkeys((*self._apart, *self._most_constrained_first()))
-        # On these problems quicker than the other solver, by a third and more.
-        problem = PartitionProblem(list(states), size, "glucose4")
-        for constraint in self._known:
-            problem.separate_all_of_one(constraint)
-        return problem
-
-    def _most_constrained_first(self) -> list[int]:
-        pairs = (pairs for constraint in self._known for pairs in constraint)
-        return most_constrained_first(self._job.states, pairs)
-
-    def figures(self) -> dict[str, float]:
-        return {
-            "separating_lower_bound": self.lower,
-            "rounds": self._rounds,
-            "constraints": len(self._known),
-        }
-
-
-class _AlphaOrBeta(_Alpha):
-    """The same for alpha or beta; the constraints are listed where they are few.
-
-    So proofs are short.  Else those that a partition breaks are found by walks, with their images
-    under the model's symmetries.
-    """
-
-    def __init__(self, job: Job) -> None:
-        super().__init__(job)
-        self._met: set[Constraint] = set()
-        self._walks: list[DifferenceWalk] = []
-        self._permutations: list[list[int]] = []
-        self._random = np.random.default_rng(job.seed)
-
-    def _prepare(self) -> Assignment | None:
-        job = self._job
-        self._permutations = symmetry_group(job.candidates).permutations
-        job.progress("walking to the last differences")
-        self._walks = [DifferenceWalk(space) for space in job.candidates.spaces]
-        for walk in self._walks:
-            self._met.update(constraints(walk.every(_LISTED) or ()))
-        self._known += sorted(self._met, key=lambda c: [sorted(pairs) for pairs in c])
-        for _ in range(_GREEDY_ROUNDS):
-            partition = greedy_partition(self._most_constrained_first(), self._known)
-            broken = self._broken(partition)
-            if not broken:
-                return partition
-            self._known += broken
-        return None
-
-    def _broken(self, partition: Assignment) -> list[Constraint]:
         word = self._job.word(partition)
         return [
             constraint
@@ -189,12 +160,29 @@ class _AlphaOrBeta(_Alpha):
                 self._met.add(image)
                 yield image
 
+    def _start(self, size: int) -> PartitionProblem:
+        # Naming the words of states that need words of their own first leaves fewest symmetries.
+        states = dict.fromkeys((*self._apart, *self._most_constrained_first()))
+        # On these problems quicker than the other solver, by a third and more.
+        problem = PartitionProblem(list(states), size, "glucose4")
+        for constraint in self._known:
+            problem.separate_all_of_one(constraint)
+        return problem
+
+    def _most_constrained_first(self) -> list[int]:
+        pairs = (pairs for constraint in self._known for pairs in constraint)
+        return most_constrained_first(self._job.states, pairs)
+
     def figures(self) -> dict[str, float]:
-        return {
-            **super().figures(),
-            "walk_nodes": sum(walk.nodes for walk in self._walks),
-            "walk_edges": sum(walk.edges for walk in self._walks),
+        found: dict[str, float] = {
+            "separating_lower_bound": self.lower,
+            "rounds": self._rounds,
+            "constraints": len(self._known),
         }
+        if not self._job.alpha_only:
+            found["walk_nodes"] = sum(walk.nodes for walk in self._walks)
+            found["walk_edges"] = sum(walk.edges for walk in self._walks)
+        return found
 
 
 def constraints(differences: Iterable[tuple[Difference, Difference]]) -> Iterator[Constraint]:
