@@ -14,6 +14,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from functools import reduce
 from itertools import groupby, takewhile
 from random import Random
 from typing import Any
@@ -62,7 +63,7 @@ class Mixtures:
     def _forget(self) -> None:
         self._spoken = SpokenChoices(self._choices)
         self._safe: set[tuple[int, _Ahead]] = set()
-        self._shared: dict[_Ahead, tuple[Words, int]] = {}
+        self._shared: dict[_Ahead, int] = {}
         self._options: dict[tuple[Words, int], list[_Option]] = {}
 
     def failing(self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize) -> list[Ints]:
@@ -120,36 +121,21 @@ class Mixtures:
         if key in self._safe:
             return None
         found = None
-        if self._can_fail(node, ahead):
-            able = self._able(ahead)
-            if able == ahead:
-                found = self._after_step(node, ahead, random)
-            elif self._can_fail(node, able):
-                found = self._failing(node, able, random)
+        chosen = tuple(self._spoken.label_set(own) for _, own in ahead)
+        if self._choices.fails(chosen, node):  # whatever is said
+            found = self._after_step(node, ahead, random)
         if found is None:
             self._safe.add(key)
         return found
 
-    def _can_fail(self, node: int, ahead: _Ahead) -> bool:
-        """Whether some choice of label sequences fails, whatever is said."""
-        chosen = tuple(self._spoken.label_set(own) for _, own in ahead)
-        return self._choices.fails(chosen, node)
-
-    def _able(self, ahead: _Ahead) -> _Ahead:
-        """What robots can do while they say what all of them can say."""
-        spoken = self._spoken
-        said, common = self._common(ahead)
-        return tuple(
-            (words, spoken.saying(own, spoken.words.before(said[len(words) :], common)))
-            for words, own in ahead
-        )
-
     def _after_step(self, node: int, ahead: _Ahead, random: Random | None) -> _Failing | None:
         """The mixture that fails after one of the next steps, or by it."""
         self._visited += 1
-        for codes, following, target in self._moves(self._edges.of(node), ahead, random):
+        left, edges = self._common(ahead), self._edges.of(node)
+        for codes, following, target in self._moves(edges, ahead, left, random):
             if target is None:
-                return codes, self._one_sentence(following, random)
+                common = self._common(following)
+                return codes, self._spoken.words.drawn(common, random or Random(0))
             below, said = following, 0
             if all(words for words, _ in following):
                 together = zip(*(words for words, _ in following), strict=False)
@@ -166,17 +152,15 @@ class Mixtures:
         self,
         edges: dict[int, Any],
         ahead: _Ahead,
+        left: int,
         random: Random | None,
         chosen: tuple[_Option, ...] = (),
-        left: int = -1,
     ) -> Iterator[tuple[list[list[int]], _Ahead, int | None]]:
         """Steps of the mixture after which the robots have a sentence in common.
 
-        Before them each can say what all can say: only robots that have made theirs restrict it.
-
-        ``edges``: those of the node with the steps ``chosen`` so far, which leave the sentences
-        ``left``.  Each robot's code, where they are then, and the node that the mixture reaches:
-        None where it fails, whatever robots do that have no code yet.
+        ``edges``: those of the node with the steps ``chosen`` so far; ``left``: the sentences that
+        all can say after them.  Each robot's code, where they are then, and the node that the
+        mixture reaches: None where it fails, whatever robots do that have no code yet.
         """
         options = self._options_of(ahead[len(chosen)])
         for option in options if random is None else random.sample(options, len(options)):
@@ -184,12 +168,12 @@ class Mixtures:
             if self._steps_left < 0:
                 raise Undecided
             label, _, _, said = option
-            common = said if left < 0 else self._spoken.words.common(left, said)
+            common = self._spoken.words.common(left, said)
             if common == NOTHING:
                 continue
             now, below = (*chosen, option), edges.get(label)
             if below is not None and len(now) < len(ahead):
-                yield from self._moves(below, ahead, random, now, common)
+                yield from self._moves(below, ahead, common, random, now)
                 continue
             codes = [[code] for _, code, _, _ in now]
             codes += [[] for _ in ahead[len(now) :]]
@@ -207,21 +191,14 @@ class Mixtures:
                 known.append((label, code, (said, after), sentences))
         return known
 
-    def _common(self, ahead: _Ahead) -> tuple[Words, int]:
-        """What the robot that is ahead of all has said, and what all can say after it."""
+    def _common(self, ahead: _Ahead) -> int:
+        """The sentences that all robots can say."""
         known = self._shared.get(ahead)
         if known is None:
-            said = max((words for words, _ in ahead), key=len)
-            sets, common = self._spoken.words, -1
-            for words, own in ahead:
-                rest = sets.after(said[len(words) :], self._spoken.sentences(own))
-                common = rest if common < 0 else sets.common(common, rest)
-            known = self._shared[ahead] = said, common
+            sets = self._spoken.words
+            own = (sets.before(said, self._spoken.sentences(after)) for said, after in ahead)
+            known = self._shared[ahead] = reduce(sets.common, own)
         return known
-
-    def _one_sentence(self, ahead: _Ahead, random: Random | None) -> Words:
-        said, common = self._common(ahead)
-        return said + self._spoken.words.drawn(common, random or Random(0))
 
     # ---- plans of a mixture
 

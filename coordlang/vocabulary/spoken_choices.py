@@ -39,12 +39,6 @@ class SentenceSets(LabelSets):
             number = self.of_moves({word: number})
         return number
 
-    def after(self, words: Sequence[int], number: int) -> int:
-        """What follows these words in the sentences of a set that begin with them."""
-        for word in words:
-            number = self.moves(number).get(word, NOTHING)
-        return number
-
     def common(self, one: int, other: int) -> int:
         """The intersection of two sets."""
         if one == other:
@@ -75,7 +69,9 @@ class SentenceSets(LabelSets):
 
     def has(self, number: int, sentence: Sequence[int]) -> bool:
         """Whether a sentence is one of a set."""
-        return _MARK in self.moves(self.after(sentence, number))
+        for word in sentence:
+            number = self.moves(number).get(word, NOTHING)
+        return _MARK in self.moves(number)
 
 
 #: A step of a robot: its code, its label, the word that is entered, if any, and what may follow.
@@ -100,7 +96,6 @@ class SpokenChoices:
         self._spoken = len(self.space.rows) + 1
         self._sentences = {END: SILENCE}
         self._projection = {END: END}
-        self._saying: dict[tuple[int, int], int] = {}
 
     def __len__(self) -> int:
         """Count the different sets."""
@@ -182,21 +177,4 @@ class SpokenChoices:
                 said = self.words.before(entered, self.sentences(after))
                 known = self.words.union(known, said)
             self._sentences[number] = known
-        return known
-
-    def saying(self, number: int, sentences: int) -> int:
-        """The part of a set along which some sentence of a set of them is said; there is one."""
-        if number == END or sentences == self.sentences(number):
-            return number
-        key = number, sentences
-        known = self._saying.get(key)
-        if known is None:
-            moves = {}
-            for code, _, entered, after in self.steps(number):
-                said = self.words.common(
-                    self.words.after(entered, sentences), self.sentences(after)
-                )
-                if said != NOTHING:
-                    moves[code] = self.saying(after, said)
-            known = self._saying[key] = self._sets.of_moves(moves)
         return known
