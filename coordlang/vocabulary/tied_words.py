@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from itertools import tee
 
 import numpy as np
@@ -38,19 +37,6 @@ _ENOUGH_FOR_FACTS = 500
 _TOGETHER, _CONFLICTS = 8, 250
 
 
-@dataclass(frozen=True, slots=True)
-class _Ties:
-    """What the words of a kind have in common.
-
-    ``classes`` (states): those of one class share a word.  ``clauses``: those of refuted
-    partitions, of one task whatever the number of words: (clauses, pairs) codes ``a * states + b``,
-    -1 for no pair.
-    """
-
-    classes: Ints
-    clauses: list[Ints] = field(default_factory=list)
-
-
 class TiedWords:
     """Looks for languages among such partitions, with effort that grows from call to call."""
 
@@ -60,38 +46,37 @@ class TiedWords:
         self._images = languages.pool.images
         self._is_one_task = job.candidates.count == 1
         self._first = _OF_ONE if self._is_one_task else _OF_MANY
-        #: What there may be in common, kind by kind; each size goes through a copy of it.
+        #: Which states share a word, kind by kind; each size goes through a copy of it.
         self._tied = self._classes(job)
         #: Those of the solvers so far on kinds that stayed undecided.
         self.conflicts = 0
         #: Of each number of words the kinds that were not looked at, and those that are undecided.
         self._kinds: dict[int, tuple[Iterator[_Kind], deque[_Kind]]] = {}
 
-    def _every(self) -> Iterator[_Ties]:
+    def _every(self) -> Iterator[Ints]:
         self._tied, every = tee(self._tied)
         return every
 
-    def _classes(self, job: Job) -> Iterator[_Ties]:
-        """Which states share a word, kind by kind: those with few classes first.
+    def _classes(self, job: Job) -> Iterator[Ints]:
+        """(states) which states share a word, kind by kind: those with few classes first.
 
         For one task: as few facts as possible decide it, then more and more.
         """
         if self._is_one_task:
-            yield from map(_Ties, classes_by_facts(job.candidates, self._languages))
+            yield from classes_by_facts(job.candidates, self._languages)
         else:  # these load networkx
             from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 
             tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
             tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
-            yield from map(_Ties, up_to_symmetry(tied, self._images))
+            yield from up_to_symmetry(tied, self._images)
 
     def of_facts(self) -> Assignment | None:
         """Of one task the language that says the steps to go and a few facts, if there is one."""
-        ties = next(self._every(), None)
-        if ties is None:
+        classes = next(self._every(), None)
+        if classes is None:
             return None
-        classes = ties.classes[self._states]
-        return dict(zip(self._states.tolist(), classes.tolist(), strict=True))
+        return dict(zip(self._states.tolist(), classes[self._states].tolist(), strict=True))
 
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
@@ -121,11 +106,9 @@ class TiedWords:
         return None
 
     def _new_kinds(self, size: int) -> Iterator[_Kind]:
-        for ties in self._every():
-            # With many tasks what other numbers met slows the solver: open 3x4 by a third.
-            own = ties if self._is_one_task else _Ties(ties.classes)
-            random = self._random if self._is_one_task else None
-            yield _Kind(self._states, own, size, self._images, self._first, random)
+        random = self._random if self._is_one_task else None
+        for classes in self._every():
+            yield _Kind(self._states, classes, size, self._images, self._first, random)
 
     @property
     def _spent(self) -> int:
@@ -151,12 +134,9 @@ class TiedWords:
             if agreeing:
                 kind.rounds += 1
                 self._languages.rounds += 1
-                codes = self._languages.pool.codes(word, agreeing, _AT_ONCE, self._random)
-                kind.ties.clauses.append(codes)
-                kind.require_clauses()
+                kind.require(self._languages.pool.codes(word, agreeing, _AT_ONCE, self._random))
             return not agreeing
 
-        kind.require_clauses()
         left = Budget(kind.effort.rounds - kind.rounds, kind.effort.conflicts)
         found = find(kind.problem.solve, holds, left)
         if found is None:
@@ -168,22 +148,21 @@ class TiedWords:
 class _Kind:
     """One kind of partitions into a number of words.
 
-    ``ties`` are what they have in common, ``first`` (states) the first state that has the same
-    word, of those that need one, ``images`` of some symmetries those after which that is not the
-    same.  ``problem`` has the partitions that are left; ``effort`` may be spent on them, and
-    ``rounds`` of them are refuted so far.  ``random`` draws the words that are tried first.
+    ``tied`` (states) says which share a word, ``first`` (states) which is the first one that has
+    the same word, of those that need one, ``images`` of some symmetries those after which that is
+    not the same.  ``problem`` has the partitions that are left; ``effort`` may be spent on them,
+    and ``rounds`` of them are refuted so far.  ``random`` draws the words that are tried first.
     """
 
     def __init__(
         self,
         states: Ints,
-        ties: _Ties,
+        tied: Ints,
         size: int,
         images: Sequence[Ints],
         effort: Budget,
         random: np.random.Generator | None = None,
     ) -> None:
-        self.ties, tied = ties, ties.classes
         _, number, of_state = np.unique(tied[states], return_index=True, return_inverse=True)
         self.first = np.arange(len(tied))
         self.first[states] = states[number[of_state]]
@@ -194,15 +173,9 @@ class _Kind:
         self.problem = PartitionProblem(free, size, "minisat22", named=False)
         if random is not None:
             self.problem.prefer_any(random, size)
-        self.effort, self.rounds, self._required = effort, 0, 0
+        self.effort, self.rounds = effort, 0
 
-    def require_clauses(self) -> None:
-        """Require what was met since the last time, at whatever number of words."""
-        for codes in self.ties.clauses[self._required :]:
-            self._require(codes)
-        self._required = len(self.ties.clauses)
-
-    def _require(self, codes: Ints) -> None:
+    def require(self, codes: Ints) -> None:
         """Require that one pair of each clause has different words, and of each clause's images.
 
         ``codes`` (clauses, pairs) are ``a * states + b``, -1 for no pair.

@@ -28,7 +28,7 @@ from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.sat import PartitionProblem
-from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits, _Ties, classes_by_facts
+from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits, classes_by_facts
 from planners.joint.tables import Ints
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
@@ -109,14 +109,13 @@ def test_partitions_of_a_kind_are_found_iff_there_are_some() -> None:
     images = [np.arange(6), one, other, one[other]]
     answers = Counter[bool]()
     for tied in [_orbits(one), _orbits(other), np.array([0, 1, 0, 1, 2, 3])] * 10:
-        kind = _Kind(np.arange(6), _Ties(tied), 2, images, Budget())
+        kind = _Kind(np.arange(6), tied, 2, images, Budget())
         firsts = kind.first.tolist()
         left = [w for w in product(range(2), repeat=6) if w == tuple(w[s] for s in firsts)]
         for _ in range(4):
             clauses = [[random.sample(range(6), 2) for _ in range(2)] for _ in range(2)]
             codes = [[min(pair) * 6 + max(pair) for pair in clause] for clause in clauses]
-            kind.ties.clauses.append(np.array([[*row, -1] for row in codes]))
-            kind.require_clauses()
+            kind.require(np.array([[*row, -1] for row in codes]))
             left = [
                 word
                 for word in left
