@@ -60,9 +60,7 @@ class PlanPairs:
     def __init__(self, choices: Choices) -> None:
         self.space, self._choices = choices.space, choices
         self._index = EdgeIndex.of(self.space)
-        self.looked_at, self._looks_ahead = 0, True
-        self._last = len(self.space) - 1
-        self._labels_of: dict[tuple[int, tuple[int, ...]], set[tuple[int, ...]]] = {}
+        self.looked_at, self._last = 0, len(self.space) - 1
         #: The number of each place that is no node, or `_HARMLESS`.
         self._numbers: dict[bytes, int] = {}
         self._found, self._failed = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)]
@@ -90,13 +88,8 @@ class PlanPairs:
         found[:, 3] += FAILED
         return found
 
-    def grow(self, most: int, *, looks_ahead: bool = True) -> bool:
-        """Look at steps of mixtures, up to about ``most`` in all; whether there are no more.
-
-        ``looks_ahead``: if all fail in the next step they have failed.  That takes as long as some
-        more steps, but is known of the last ones, too.
-        """
-        self._looks_ahead = looks_ahead
+    def grow(self, most: int) -> bool:
+        """Look at steps of mixtures, up to about ``most`` in all; whether there are no more."""
         while self.looked_at < most and (self._open or self._later):
             if not self._open:
                 self._open = [*map(_joined, self._later.values())]
@@ -122,7 +115,7 @@ class PlanPairs:
             expected = _FOR_PAIR * waiting * (2 if waiting > 2 * before else 1)
             if self.looked_at + expected > most:
                 return False
-            self.grow(self.looked_at + waiting, looks_ahead=False)
+            self.grow(self.looked_at + waiting)
         return True
 
     def _sizes(self, places: _Places) -> Ints:
@@ -186,12 +179,6 @@ class PlanPairs:
         told, mixed = table[fresh, : told.shape[1]].astype(np.bool_), table[fresh, told.shape[1] :]
         numbers = np.full(len(fresh), _HARMLESS)
         fails = self._can_fail(told, mixed)
-        if self._looks_ahead:
-            ends = [
-                not self._all_go_on(*own) for own in zip(told[fails], mixed[fails], strict=True)
-            ]
-            numbers[fails] = np.where(ends, FAILED, _HARMLESS)
-            fails[fails] = np.logical_not(ends)
         numbers[fails] = self._last + 1 + np.arange(int(fails.sum()))
         self._last += int(fails.sum())
         if fails.any():
@@ -202,29 +189,6 @@ class PlanPairs:
         found = np.full(len(nodes), _HARMLESS)
         found[apart] = np.array([self._numbers[key] for key in keys], np.int64)[row]
         return found
-
-    def _all_go_on(self, told: Bools, nodes: Ints) -> bool:
-        """Whether each of two plans may go on with all mixtures, as far as its labels tell."""
-        second = [_following(told[None], column)[0] for column in range(len(nodes))]
-        mixed = nodes.tolist()
-        return all(
-            any(
-                all(self._may(node, robots, edge) for node, robots in zip(mixed, own, strict=True))
-                for edge in self.space.out_edges(plan)
-            )
-            for plan, own in (
-                (mixed[0], [tuple(np.flatnonzero(~some).tolist()) for some in second]),
-                (mixed[-1], [tuple(np.flatnonzero(some).tolist()) for some in second]),
-            )
-        )
-
-    def _may(self, node: int, robots: tuple[int, ...], edge: int) -> bool:
-        """Whether in some step from a node these robots do what they do on an edge."""
-        if (node, robots) not in self._labels_of:
-            steps = map(self.space.labels_of, self.space.out_edges(node))
-            self._labels_of[node, robots] = {tuple(s[r] for r in robots) for s in steps}
-        labels = self.space.labels_of(edge)
-        return tuple(labels[robot] for robot in robots) in self._labels_of[node, robots]
 
     def _can_fail(self, told: Bools, nodes: Ints) -> Bools:
         """Whether something fails of what robots may do from where their plans are.

@@ -65,8 +65,8 @@ def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: 
                     two = zip(*(states.tolist() for states in entered), strict=True)
                     fail[id(space)].add(tuple(pair(a, b) if a != b else None for a, b in two))
         for space in candidates.spaces:
-            for looks_ahead, within in product((True, False), (0, 1, inf)):
-                pairs = grown(space, looks_ahead)
+            for at_once, within in product((True, False), (0, 1, inf)):
+                pairs = grown(space, at_once)
                 paths = set(paths_of(failing_pairs(pairs, within, 10**6)))
                 assert paths <= {plans[:n] for plans in fail[id(space)] for n in range(20)}
                 if within == inf:
@@ -102,10 +102,10 @@ def least_of(paths: Iterable[tuple[Pair | None, ...]]) -> set[frozenset[Pair | N
     return {states for states in every if not any(other < states for other in every)}
 
 
-def grown(space: PlanSpace, looks_ahead: bool = False) -> PlanPairs:
+def grown(space: PlanSpace, at_once: bool = False) -> PlanPairs:
     """All pairs of plans."""
     pairs = PlanPairs(Choices(space))
-    assert pairs.grow(10**6) if looks_ahead else pairs.complete(10**6)
+    assert pairs.grow(10**6) if at_once else pairs.complete(10**6)
     return pairs
 
 
