@@ -192,6 +192,8 @@ def test_every_mixture_of_random_models(robots: int) -> None:
 #: Other names in the three cells, and then the IDs of the trees and of the leaf; none: refused.
 NAMES: list[tuple[dict[str, str], list[str]]] = [
     ({"w0": "a--b<&", "w1": "---"}, ["r1", "r2", "move"]),
+    ({"w0": "-", "w1": "---", "w2": "w--"}, ["r1", "r2", "move"]),
+    ({"w1": "a--b<&"}, ["r1", "r2", "move"]),
     ({"r1": "a.b", "r2": "a_b", "move": "a/b"}, ["a_b__", "a_b", "a_b_"]),
     ({"r1": "move", "r2": "root"}, ["move_", "root_", "move"]),
     ({"a": "{a}"}, []),
