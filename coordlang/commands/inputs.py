@@ -20,7 +20,7 @@ from planners.pddl.model_options import ModelOptions
 from planners.system.errors import Position, UsageError, note
 from planners.system.files import names_format, read_bytes
 from planners.system.messages import Presented
-from planners.system.options import Option, checked_value, options_of, record_from
+from planners.system.options import checked_argument, options_of, record_from
 
 if TYPE_CHECKING:
     from coordlang.execution.task_language import TaskLanguage
@@ -86,8 +86,7 @@ def public(
 
 def _argument(word: str, value: object) -> object:
     """The value of an argument, None where there is none; `UsageError` for one of another type."""
-    described = Option("", names=(word,), kind=given.ARGUMENTS[word])
-    return None if value is None else checked_value(described, value)
+    return None if value is None else checked_argument(word, given.ARGUMENTS[word], value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +261,7 @@ def load_language(path: given.File) -> Language:
     """
     from coordlang.language.file import read_language as read_language_file
 
-    checked_value(Option("", names=("path",), kind=given.File), path)
+    checked_argument("path", given.File, path)
     return read_language_file(fspath(path))
 
 

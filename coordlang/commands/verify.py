@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
@@ -201,14 +200,16 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
 
 def _note_other_robots(loaded: PlanningInstance) -> None:
     """Write a note where the robots of a language file are not those that are found without it."""
-    with suppress(BadInput, UsageError):  # there is no other way to tell who they are
+    try:
         with catch_warnings():
             simplefilter("ignore", Note)
             found = find_team(loaded.domain, loaded.problems[0], ModelOptions()).robots
-        if {*found, ENVIRONMENT} != {*loaded.team.robots, ENVIRONMENT}:
-            robots = ", ".join(loaded.team.robots)
-            without = f"without it they are {', '.join(found)}"
-            note(f"the language file says that the robots are {robots}; {without}")
+    except (BadInput, UsageError):  # there is no other way to tell who they are
+        return
+    if {*found, ENVIRONMENT} != {*loaded.team.robots, ENVIRONMENT}:
+        robots = ", ".join(loaded.team.robots)
+        without = f"without it they are {', '.join(found)}"
+        note(f"the language file says that the robots are {robots}; {without}")
 
 
 def show_verify(found: Verification, options: VerifyOptions) -> int:

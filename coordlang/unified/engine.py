@@ -67,7 +67,7 @@ from planners.system.errors import (
     UsageError,
 )
 from planners.system.limits import time_limit
-from planners.system.options import Option, checked_value, record_from
+from planners.system.options import checked_argument, record_from
 
 #: The kinds of plans that the engine returns and validates.
 PLAN_KINDS = (PlanKind.PARTIAL_ORDER_PLAN, PlanKind.SEQUENTIAL_PLAN, PlanKind.TIME_TRIGGERED_PLAN)
@@ -116,7 +116,7 @@ class EngineOptions:
             record_from(ModelOptions, model, NAME)
             for name, kind in _KINDS.items():
                 if given.get(name) is not None:
-                    given[name] = checked_value(Option("", names=(name,), kind=kind), given[name])
+                    given[name] = checked_argument(name, kind, given[name])
             options = cls(model, **{**given, "language": _read(given.get("language"))})
             if options.sentence is not None and options.language is None:
                 raise UsageError("a sentence needs its language", remedy="Give language, too.")

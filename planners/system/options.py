@@ -222,6 +222,11 @@ def checked_value(given: Option, value: object) -> object:
     return float(value) if given.kind is float and isinstance(value, Real) else value
 
 
+def checked_argument(name: str, kind: object, value: object) -> object:
+    """The value of what is no option of a record; see `checked_value`."""
+    return checked_value(Option("", names=(name,), kind=kind), value)
+
+
 def _check_kind(given: Option, value: object) -> None:
     """Raise `UsageError` for a value of another type than the option's, and for no path."""
     kinds = get_args(given.kind) if _is_union(given.kind) else (given.kind,)
