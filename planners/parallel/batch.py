@@ -12,6 +12,7 @@ import os
 import pickle
 import stat
 import sys
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -39,6 +40,8 @@ Function = Callable[[Any, Any], Table]
 
 #: A table may take one part in so many of what a bounded store may take.
 _LARGEST = 4
+#: Seconds after which what is half written is nobody's any more.
+_LEFT_BEHIND = 3_600
 #: How often a table is written in a folder that others remove meanwhile.
 _TRIES = 3
 
@@ -199,11 +202,11 @@ class Store:
     def _let_go(self, most: int) -> None:
         """Remove files until the others take no more than ``most`` bytes."""
         entries = []
-        # Others are being written: they are the newest, unless their process was killed.
         for path in (*self.path.glob("*.table"), *self.path.glob(".*.????????")):
             with suppress(OSError):  # another process was faster
                 found = path.stat()
-                entries.append((found.st_mtime, found.st_size, path))
+                if path.suffix == ".table" or found.st_mtime < time.time() - _LEFT_BEHIND:
+                    entries.append((found.st_mtime, found.st_size, path))
         left = sum(size for _, size, _ in entries)
         for _, size, path in sorted(entries):
             if left <= most:
