@@ -11,6 +11,7 @@ with few cores more workers than cores gain nothing; processor seconds say what 
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import sys
@@ -44,12 +45,14 @@ def build(name: str, output: Path, *options: str) -> tuple[object, float, float]
 
 def main() -> None:
     """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("name", nargs="?", default="grid/corners-5x5", metavar="FOLDER/PROBLEM")
+    name = parser.parse_args().name
     try:
         from distributed import LocalCluster
     except ImportError:
         sys.exit("there is no Dask: pip install '.[cluster]'")
 
-    name = sys.argv[1] if len(sys.argv) > 1 else "grid/corners-5x5"
     print(f"{name}, all pairs; {os.cpu_count()} cores")
     heads = ("wall s", "client cpu s", "cluster cpu s", "load", "equal")
     table = PrintedTable(("who", -16), *((head, 13) for head in heads))
