@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
 from typing import Any, get_args, get_origin
 
@@ -34,45 +35,58 @@ _EXAMPLES = {
 FILE = click.Path(readable=False)
 
 
-def command_of(name: str, record: type[CommandOptions]) -> click.Command:
+def command_of(record: type[CommandOptions]) -> click.Command:
     """Make a command whose help is the docstring of its record.
 
     Its module is loaded when it is called: there are the function of its name, made by
     `coordlang.commands.inputs.public`, and ``show_NAME``, which gets the result and the options,
     writes, and returns the exit code, None for 0.
     """
-    hidden = () if record.keeps_plans else ("no_cache",)
-    on_cli = {o.name: o for o in options_of(record) if o.only != "python" and o.name not in hidden}
-
-    def called(arguments: tuple[str, ...] = (), **values: object) -> int | None:
-        from coordlang.commands.inputs import Arguments
-
-        context = click.get_current_context()
-        said = click.core.ParameterSource.COMMANDLINE
-        given = {k: v for k, v in values.items() if context.get_parameter_source(k) is said}
-        read = _positional(record, arguments, given, on_cli)
-        if given.get("as_json") and "form" in on_cli and given.setdefault("form", "json") != "json":
-            short = "--json is short for --format json"
-            raise click.UsageError(f"{short}: leave out --format {given['form']}")
-        module = import_module(f"coordlang.commands.{record.module or name}")
-        options = record_from(record, given, name, on_cli=True)
-        is_kept = record.keeps_plans and not options.no_cache
-        cache = _keeping() if is_kept else nullcontext()
-        with limited(options.limits), cache, _said(given.get("resume")):
-            with working(record.doing) as context.meta[SAYING]:
-                files = [(each, given[each.name]) for each in on_cli.values() if each.name in given]
-                check_outputs(*_files(arguments, files, options))
-                function = getattr(module, record.function or name).__wrapped__
-                found = function(Arguments(getattr(options, "source", Source()), read), options)
-            shown: int | None = getattr(module, f"show_{name}")(found, options)
-            return shown
-
+    hidden = "" if record.keeps_plans else "no_cache"
+    on_cli = {o.name: o for o in options_of(record) if o.only != "python" and o.name != hidden}
     argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
     params = [*([argument] if record.takes else []), *map(_click_option, on_cli.values())]
-    example = f"\b\nExample:\n  coordlang {name} {record.example.format(**_EXAMPLES)}"
-    made = _Command(name, params=params, callback=called, help=record.__doc__, epilog=example)
+    example = f"\b\nExample:\n  coordlang {record.name} {record.example.format(**_EXAMPLES)}"
+    called = partial(_called, record, on_cli)
+    made = _Command(
+        record.name, params=params, callback=called, help=record.__doc__, epilog=example
+    )
     made.used = tuple(record.used.split())
     return made
+
+
+def _called(
+    record: type[CommandOptions],
+    on_cli: Mapping[str, Option],
+    arguments: tuple[str, ...] = (),
+    **values: object,
+) -> int | None:
+    """Call the function of a command and show the result; the exit code, None for 0."""
+    from coordlang.commands.inputs import Arguments
+
+    context = click.get_current_context()
+    said = click.core.ParameterSource.COMMANDLINE
+    given = {k: v for k, v in values.items() if context.get_parameter_source(k) is said}
+    read = _positional(record, arguments, given, on_cli)
+    if "as_json" in given and "form" in on_cli:
+        _take_json_for_form(given)
+    module = import_module(f"coordlang.commands.{record.module}")
+    options = record_from(record, given, record.name, on_cli=True)
+    with limited(options.limits), _keeping(options), _said(given.get("resume")):
+        with working(record.doing) as context.meta[SAYING]:
+            files = [(each, given[each.name]) for each in on_cli.values() if each.name in given]
+            check_outputs(*_files(arguments, files, options))
+            function = getattr(module, record.function).__wrapped__
+            found = function(Arguments(getattr(options, "source", Source()), read), options)
+        shown: int | None = getattr(module, f"show_{record.name}")(found, options)
+        return shown
+
+
+def _take_json_for_form(given: dict[str, object]) -> None:
+    """Take ``--json`` for ``--format json``; `click.UsageError` beside another format."""
+    if given.setdefault("form", "json") != "json":
+        short = "--json is short for --format json"
+        raise click.UsageError(f"{short}: leave out --format {given['form']}")
 
 
 class _Command(click.Command):
@@ -81,16 +95,16 @@ class _Command(click.Command):
     used: tuple[str, ...] = ()
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        model = {each.name for each in options_of(Source)}
-        work = {"no_cache", *(each.name for kind in (Jobs, Limits) for each in options_of(kind))}
-        kinds = {"Most used": self.used, "Model": model, "Work and limits": work}
-        titles = ("Most used", "Options", "Model", "Work and limits")
-        sections: dict[str, list[tuple[str, str]]] = {title: [] for title in titles}
+        sections: dict[str, list[tuple[str, str]]]
+        sections = {"Most used": [], "Options": [], "Model": [], "Work and limits": []}
+        title_of = {"no_cache": "Work and limits"}
+        kinds = {Source: "Model", Jobs: "Work and limits", Limits: "Work and limits"}
+        for kind, title in kinds.items():
+            title_of |= {each.name: title for each in options_of(kind)}
+        title_of |= dict.fromkeys(self.used, "Most used")
         for param in self.get_params(ctx):
-            kind = next((each for each, names in kinds.items() if param.name in names), "Options")
-            row = param.get_help_record(ctx)
-            if row is not None and isinstance(param, click.Option):
-                sections[kind].append(row)
+            if (row := param.get_help_record(ctx)) is not None:
+                sections[title_of.get(param.name or "", "Options")].append(row)
         for title, rows in sections.items():
             if rows:
                 with formatter.section(title):
@@ -108,28 +122,34 @@ def _positional(
     One in brackets may be left out.  ``--factored`` stands for DOMAIN and PROBLEM.  Raises
     `click.UsageError` for too few or too many.
     """
-    is_factored = given.get("factored") is not None
-    alone = options[record.alone] if record.alone in given else None
-    names = [] if alone else record.takes.split()
-    asked = [name for name in names if not (is_factored and name in _PDDL)]
-    least = sum(not name.startswith("[") for name in asked)
-    is_open = bool(asked) and asked[-1].endswith("...")
-    fits = least <= len(arguments) and (is_open or len(arguments) <= len(asked))
-    if not fits or (alone and is_factored):
-        raise click.UsageError(f"expected {_usage(record.takes, alone)}")
-    read: dict[str, object] = dict(zip(asked, arguments, strict=False))
+    is_factored, takes = "factored" in given, record.takes
+    if record.alone in given:
+        if arguments or is_factored:
+            alone = f"{options[record.alone].spelling} {options[record.alone].metavar} alone"
+            raise click.UsageError(f"expected {alone}, without {takes}")
+        return {}
+    names = _beside_pddl(takes) if is_factored else takes.split()
+    said = " ".join(names)
+    least, is_open = len(names) - said.count("["), said.endswith("...")
+    most = len(arguments) if is_open else len(names)
+    if not least <= len(arguments) <= most:
+        raise click.UsageError(f"expected {_usage(takes)}")
+    read: dict[str, object] = dict(zip(names, arguments, strict=False))
     if is_open:
-        read[asked[-1]] = arguments[len(asked) - 1 :]
+        read[names[-1]] = arguments[len(names) - 1 :]
     return {name.strip("[]"): value for name, value in read.items()}
 
 
-def _usage(takes: str, alone: Option | None) -> str:
-    if alone is not None:
-        return f"{alone.spelling} {alone.metavar} alone, without {takes}"
-    if "DOMAIN" not in takes:
+def _beside_pddl(takes: str) -> list[str]:
+    """The arguments that there are beside domain and problems."""
+    return [name for name in takes.split() if name not in _PDDL]
+
+
+def _usage(takes: str) -> str:
+    beside = _beside_pddl(takes)
+    if beside == takes.split():
         return takes
-    without = "them" if set(takes.split()) <= set(_PDDL) else "DOMAIN PROBLEM"
-    return f"{takes}, or --factored DIR without {without}"
+    return f"{takes}, or --factored DIR without {'DOMAIN PROBLEM' if beside else 'them'}"
 
 
 @contextmanager
@@ -145,8 +165,11 @@ def limited(limits: Limits) -> Iterator[None]:
 
 
 @contextmanager
-def _keeping() -> Iterator[None]:
-    """Run a block that searches no task again that it finds in the user's cache."""
+def _keeping(options: CommandOptions) -> Iterator[None]:
+    """Run a block that searches no task again that it finds in the user's cache, if it may."""
+    if options.no_cache or not options.keeps_plans:
+        yield
+        return
     from planners.search.kept_plans import default_folder, keeping_plans, plan_store
 
     place = default_folder()
@@ -196,12 +219,12 @@ def _files(
 
 
 def _outputs(option: Option, paths: list[str], files: Sequence[str]) -> Iterator[OutputFile]:
-    """The files of an option that names files, or folders for some ``files``."""
+    """The files of an option that names files, or folders for some ``files``; stdout is none."""
     for number, path in enumerate(paths, 1):
         spelling = option.spelling if len(paths) == 1 else f"{option.spelling} {number}"
         if option.name != "output" and path == "-":
             raise UsageError(f"{spelling} -: this cannot go to stdout", remedy="Name a file.")
-        if not files:
+        if not files and path != "-":
             yield OutputFile(spelling, path)
         for file in files:
             yield OutputFile(spelling, os.path.join(path, file) if path else "", makes_folder=True)
@@ -212,31 +235,34 @@ def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
 
     Before the work, not after it.  Raises `UsageError`.
     """
-    outputs = list(outputs)
-    if not outputs:
-        return
-    from planners.system.writing import is_device, why_unwritable
-
     read = [path for path in inputs if path != "-" and os.path.isfile(path)]
     written: dict[str, str] = {}
-    for option, path, makes_folder in outputs:
-        if path == "-":
-            continue
-        what, remedy = "", "Give the output another name."
-        if reason := why_unwritable(path, makes_folder=makes_folder):
-            what = f"{option} {path} cannot be written: {reason}"
-            remedy = "Name a file in a folder that you may write to."
-        elif is_device(path):
-            continue  # a device or a pipe is written to, and never replaced
-        elif os.path.exists(path) and any(os.path.samefile(path, other) for other in read):
-            what = f"{option} {path} would overwrite an input file"
-        else:
-            place = os.path.realpath(path)
-            taken = {place, os.path.dirname(place)} if makes_folder else {place}
-            if others := {written.setdefault(each, option) for each in taken} - {option}:
-                what = f"{min(others)} and {option} name the same file: {path}"
-        if what:
-            raise UsageError(what, remedy=remedy)
+    for output in outputs:
+        _check_output(output, read, written)
+
+
+def _check_output(output: OutputFile, read: Iterable[str], written: dict[str, str]) -> None:
+    """Check one output, and enter what it takes in ``written``, the options by their files."""
+    from planners.system.writing import is_device, why_unwritable
+
+    option, path, makes_folder = output
+    if reason := why_unwritable(path, makes_folder=makes_folder):
+        raise UsageError(
+            f"{option} {path} cannot be written: {reason}",
+            remedy="Name a file in a folder that you may write to.",
+        )
+    if is_device(path):
+        return  # it is written to, and never replaced
+    place = os.path.realpath(path)
+    taken = {place, os.path.dirname(place)} if makes_folder else {place}
+    others = {written.setdefault(each, option) for each in taken} - {option}
+    if os.path.exists(path) and any(os.path.samefile(path, other) for other in read):
+        what = f"{option} {path} would overwrite an input file"
+    elif others:
+        what = f"{min(others)} and {option} name the same file: {path}"
+    else:
+        return
+    raise UsageError(what, remedy="Give the output another name.")
 
 
 def _names_file(given: Option) -> bool:

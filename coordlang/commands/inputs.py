@@ -12,7 +12,7 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from coordlang.commands import records as given
-from coordlang.commands.records import Source, TasksSource
+from coordlang.commands.records import LoadOptions, Source, TasksSource
 from planners.loading import PlanningInstance, build
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
@@ -40,24 +40,16 @@ _FIXED = frozenset(
 
 
 def public(
-    record: type[Any], takes: str | None = None
+    record: type[Any],
 ) -> Callable[[Callable[[Arguments, Any], Result]], Callable[..., Result]]:
     """Make a function of `Arguments` and a record one with positional arguments and keywords.
 
     Its parameters are those that the record ``takes``, then, by keyword, the options of the record.
     Commands, which have both, call what it wraps.
     """
-    words = [word.strip("[]") for word in (record.takes if takes is None else takes).split()]
-    word_of = {word.strip(".").lower(): word for word in words}
-    parameters, of = [], inspect.Parameter
-    for name, word in word_of.items():
-        is_many = word.endswith("...")
-        # What a command can do without its function can, too.
-        is_needed = word == words[0] != "DOMAIN" and not getattr(record, "alone", "")
-        default = of.empty if is_needed or is_many else None
-        how = of.VAR_POSITIONAL if is_many else of.POSITIONAL_OR_KEYWORD
-        parameters.append(of(name, how, default=default))
-    own = inspect.Signature(parameters)
+    words = {word.strip("[].").lower(): word.strip("[]") for word in record.takes.split()}
+    parameters = [_parameter(record, name, word) for name, word in words.items()]
+    own, of = inspect.Signature(parameters), inspect.Parameter
     keyword_only = [
         of(each.name, of.KEYWORD_ONLY, default=each.default)
         for each in options_of(record)
@@ -67,21 +59,33 @@ def public(
     def decorate(function: Callable[[Arguments, Any], Result]) -> Callable[..., Result]:
         @functools.wraps(function)
         def called(*arguments: object, **keywords: Any) -> Result:
-            named = {name: keywords.pop(name) for name in [*keywords] if name in word_of}
+            named = {name: keywords.pop(name) for name in words.keys() & keywords.keys()}
             options = record_from(record, keywords, function.__name__)
             read = own.bind(*arguments, **named)
             read.apply_defaults()
-            values = {}
+            values: dict[str, object] = {}
             for name, value in read.arguments.items():
-                word = word_of[name]
-                each = functools.partial(_argument, word)
-                values[word] = tuple(map(each, value)) if word.endswith("...") else each(value)
-            return function(Arguments(getattr(options, "source", options), values), options)
+                check = functools.partial(_argument, words[name])
+                is_many = words[name].endswith("...")
+                values[words[name]] = tuple(map(check, value)) if is_many else check(value)
+            return function(Arguments(getattr(options, "source", Source()), values), options)
 
         called.__signature__ = inspect.Signature([*parameters, *keyword_only])  # type: ignore[attr-defined]
         return called
 
     return decorate
+
+
+def _parameter(record: type[Any], name: str, word: str) -> inspect.Parameter:
+    """The parameter for an argument of a command.
+
+    What a command can do without, its function can, too: domain and problems may be factored.
+    """
+    if word.endswith("..."):
+        return inspect.Parameter(name, inspect.Parameter.VAR_POSITIONAL)
+    is_needed = word in ("LANGUAGE", "LIFTED") and not record.alone
+    default = inspect.Parameter.empty if is_needed else None
+    return inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=default)
 
 
 def _argument(word: str, value: object) -> object:
@@ -103,6 +107,11 @@ class Arguments:
         return domain if isinstance(domain, PlanningInstance) else None
 
     @property
+    def domain(self) -> Domain | given.File | None:
+        """The domain that is given, or that of `load`."""
+        return self.loaded.domain if self.loaded else self.values.get("DOMAIN")
+
+    @property
     def problems(self) -> list[given.ProblemSource]:
         """The problems that are given, else those of `load`."""
         found = [*self.values.get("PROBLEMS...", ()), self.values.get("PROBLEM")]
@@ -122,16 +131,9 @@ class Arguments:
 
         Raises `UsageError` for too few or too many of them.
         """
-        domain, problems, loaded = self.values.get("DOMAIN"), self.problems, self.loaded
+        domain, problems = self.domain, self.problems
         if self.source.factored is not None:
-            if domain is not None or problems:
-                raise UsageError(
-                    "--factored names all files", remedy="Leave out domain and problem."
-                )
-            from planners.pddl.factored import read_factored
-
-            factored, problem = read_factored(fspath(self.source.factored))
-            return PlanningInput(factored, [problem], self.source)
+            return self._read_factored(self.source.factored)
         is_single = "PROBLEMS..." not in self.values
         if domain is None or not problems or (is_single and len(problems) > 1):
             wanted = "one problem" if is_single else "problems"
@@ -139,11 +141,17 @@ class Arguments:
                 f"expected a domain and {wanted}, or --factored without them",
                 remedy="Give both as files or parsed objects, or factored=DIR.",
             )
-        if loaded is not None:
-            domain = loaded.domain
         lifted = domain if isinstance(domain, Domain) else read_domain(fspath(domain))
         found = [p if isinstance(p, Problem) else read_problem(fspath(p), lifted) for p in problems]
         return PlanningInput(lifted, found, self._source())
+
+    def _read_factored(self, folder: given.File) -> PlanningInput:
+        if self.domain is not None or self.problems:
+            raise UsageError("--factored names all files", remedy="Leave out domain and problem.")
+        from planners.pddl.factored import read_factored
+
+        domain, problem = read_factored(fspath(folder))
+        return PlanningInput(domain, [problem], self.source)
 
     def _source(self) -> Source:
         """How files are read; a result of `load` says that itself."""
@@ -154,8 +162,7 @@ class Arguments:
                 "the model options of a loaded domain are fixed",
                 remedy="Give them to coordlang.load.",
             )
-        # A language must have been built with the same options; its robots may be named there
-        # alone.
+        # A language was built with the same options; its robots may be named there alone.
         options = self.loaded.options
         return Source(None, options, _FIXED | ({"robots"} if options.names else set()))
 
@@ -242,8 +249,8 @@ def extended(kind: type[Result], found: Any, *more: object) -> Result:
     return kind(*(getattr(found, each.name) for each in fields(found)), *more)
 
 
-@public(Source, "DOMAIN PROBLEMS...")
-def load(files: Arguments, options: Source) -> PlanningInstance:
+@public(LoadOptions)
+def load(files: Arguments, options: LoadOptions) -> PlanningInstance:
     """Read a domain and problems, and build their joint model.
 
     The result stands for the domain and its problems in every other function, which then read and

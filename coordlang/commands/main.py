@@ -82,7 +82,7 @@ class _LazyGroup(click.Group):
         from coordlang.commands.command import command_of
         from coordlang.commands.records import record_of
 
-        return command_of(cmd_name, record_of(cmd_name))
+        return command_of(record_of(cmd_name))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         for title, group in GROUPS.items():

@@ -103,16 +103,18 @@ class CommandOptions:
 
     Each record that is made of this one is a frozen dataclass, too.  The command ``takes``
     arguments as the usage line shows them, and none where the option ``alone`` is given.
-    A terminal shows what it is ``doing``.  Its ``function`` has its name and is in the ``module``
-    of its name, unless others are named, and searches no task again that was searched before if it
-    ``keeps_plans``.  Its help begins with the options that are ``used`` most, by name, and ends
-    with an ``example``, in which names in braces are files (`coordlang.commands.command`).
+    A terminal shows what it is ``doing``.  Its ``name`` is the record's; its ``function`` has that
+    name and is in the ``module`` of that name, unless others are named, and searches no task again
+    that was searched before if it ``keeps_plans``.  Its help begins with the options that are
+    ``used`` most, by name, and ends with an ``example``, in which names in braces are files
+    (`coordlang.commands.command`).
     """
 
     takes: ClassVar[str] = ""
     doing: ClassVar[str] = "finding all optimal plans"
-    module: ClassVar[str | None] = None
-    function: ClassVar[str | None] = None
+    name: ClassVar[str]
+    module: ClassVar[str]
+    function: ClassVar[str]
     keeps_plans: ClassVar[bool] = True
     alone: ClassVar[str] = ""
     used: ClassVar[str] = ""
@@ -122,8 +124,9 @@ class CommandOptions:
     limits: Limits = group(Limits)
 
     def __init_subclass__(cls, **said: str | bool) -> None:
-        for name, value in said.items():
-            setattr(cls, name, value)
+        own = cls.__name__.removesuffix("Options").lower()
+        for key, value in {"name": own, "module": own, "function": own, **said}.items():
+            setattr(cls, key, value)
         dataclass(frozen=True, eq=False, repr=False)(cls)
 
 
@@ -162,6 +165,10 @@ class PlanningOptions(CommandOptions):
 
     # Plans are optimal and in step, or a language file says what they are.
     source: Source = group(Source, without="slack words_see_slack asynchronous")
+
+
+class LoadOptions(PlanningOptions, takes="DOMAIN PROBLEMS..."):
+    """What `coordlang.load` can be asked for, which no command does."""
 
 
 class JsonOptions(CommandOptions):
