@@ -212,17 +212,22 @@ def _exit_code(
     built: Built, output: str, certificate: str | None, ended: BaseException | None
 ) -> int:
     """The exit code; says what ended the work early: ``ended`` after the language was built."""
-    proved, exact = built.guarantee.proved_minimal, built.guarantee.method in EXACT
     stopped = ended or built.stopped
     if isinstance(stopped, KeyboardInterrupt):
         return ended_early(stopped, _written(built, output, certificate))
-    is_kept = certificate and isinstance(stopped, OutOfTime) and stopped is built.stopped
-    short_of = "" if proved and exact else ", without proof"
-    best = "partition into words" if built.few_words else "language"
-    what = f"the best {best} so far is written{short_of}"
-    ended_early(stopped, what, ", a part of it kept for the certificate" if is_kept else "")
-    is_short = not proved or ended is not None if exact else stopped is not None
-    return UNPROVED if is_short else 0
+    is_kept = certificate and isinstance(built.stopped, OutOfTime) and ended is None
+    kept = ", a part of it kept for the certificate" if is_kept else ""
+    code = ended_early(stopped, _best(built), kept)
+    if built.guarantee.method in EXACT and ended is None:
+        return 0 if built.guarantee.proved_minimal else UNPROVED
+    return code
+
+
+def _best(built: Built) -> str:
+    """What is written when a search ends early."""
+    what = "partition into words" if built.few_words else "language"
+    is_proved = built.guarantee.method in EXACT and built.guarantee.proved_minimal
+    return f"the best {what} so far is written{'' if is_proved else ', without proof'}"
 
 
 def _written(built: Built, output: str, certificate: str | None = None) -> str:

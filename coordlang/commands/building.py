@@ -106,8 +106,9 @@ def build_language(
                 raise
             job = replace(job, effort=0)
         # It is verified now, for there is no time when an anytime method is stopped.
-        job = replace(job, incumbent=first_language(job))
-        making.check(job.incumbent or {})
+        incumbent = first_language(job)
+        job = replace(job, incumbent=incumbent)
+        making.check(incumbent)
         making.note("incumbent")
         if reserve:
             job = replace(job, by_clauses=True)

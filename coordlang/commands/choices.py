@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
+from itertools import islice
 from operator import and_
 from os import fspath
 from typing import Any
@@ -183,28 +184,28 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
     model, automaton = found.used.model, own.automaton
     subplans, states = counted(automaton.count, "subplan"), counted(len(automaton), "state")
     lines = [f"follow {subplans} ({states}):"]
-    unit, nothing = model.unit, _IDLING[model.unit]
-    rows: list[tuple[str, str, str, list[str], str]] = []
-    for step, layer in enumerate(automaton.layers[:-1], 1):
-        if layer.start >= STATES_SHOWN:
-            break
-        for state, atoms in zip(layer, _distinguishing(found.used, own, layer), strict=True):
-            moves = [
-                f"{model.label_text(own.robot, label) or nothing} -> {to}"
-                for label, to in automaton.moves[state].items()
-            ]
-            left = f"{automaton.left[state]:,}"
-            rows.append((str(step), str(state), left, moves, atoms))
-    if rows := rows[:STATES_SHOWN]:
+    if rows := [*islice(_rows(found.used, own), STATES_SHOWN)]:
         widest = max(len(" | ".join(moves)) for *_, moves, _ in rows)
         mark = " | " if widest <= width // 2 else "\n| "
-        head = (unit, "state", "left", "may do", "knows")
+        head = (model.unit, "state", "left", "may do", "knows")
         cells = [(*row[:3], mark.join(row[3]), row[4]) for row in rows]
         lines += columns([head, *cells], width, numbers=3)
     rest = automaton.layers[-1].start - len(rows)
     if rest > 0:
         lines.append(f"  .. and {counted(rest, 'state')} more; --format json has all of them")
     return lines
+
+
+def _rows(used: TaskLanguage, own: RobotChoices) -> Iterator[tuple[str, str, str, list[str], str]]:
+    """The cells of each state; what may be done there is a list."""
+    automaton, nothing = own.automaton, _IDLING[used.model.unit]
+    for step, layer in enumerate(automaton.layers[:-1], 1):
+        for state, atoms in zip(layer, _distinguishing(used, own, layer), strict=True):
+            moves = [
+                f"{used.model.label_text(own.robot, label) or nothing} -> {to}"
+                for label, to in automaton.moves[state].items()
+            ]
+            yield str(step), str(state), f"{automaton.left[state]:,}", moves, atoms
 
 
 def _distinguishing(used: TaskLanguage, own: RobotChoices, states: range) -> list[str]:

@@ -10,6 +10,7 @@ from statistics import mean
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, extended, public
+from coordlang.commands.plans import plans_text
 from coordlang.commands.records import CoordinationOptions
 from coordlang.commands.terminal import WIDTH, fitted, note_single_robot, show_answer
 from coordlang.commands.witness import witness_data, witness_text
@@ -18,7 +19,7 @@ from coordlang.required.failure import Failures
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.required.task_answers import TaskAnswer, answers
 from planners.search.plan_file import json_count
-from planners.system.messages import Presented, counted
+from planners.system.messages import Presented
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -66,24 +67,19 @@ class TaskCoordination(Presented, TaskAnswer):
 
     def text(self) -> str:
         """The answer, in lines of any length."""
-        answer = "is required" if self.required else "is not required"
-        if not self.required and self.plans > 1:
-            answer += f": any mixture of them is {'one' if self.slack else 'optimal'}"
-        plans = f"{counted(self.plans, 'optimal plan')} of {counted(self.makespan, 'step')}"
-        if self.slack:
-            most = counted(self.makespan + self.slack, "step")
-            plans = f"{counted(self.plans, 'plan')} within slack {self.slack}, of at most {most}"
-        line = f"{self.problem}: {plans}; coordination {answer}"
+        plans = plans_text(self.plans, self.makespan + self.slack, self.slack)
+        line = f"{self.problem}: {plans}; coordination is"
         if self.witness is None:
-            return line
-        share = self.failures.estimate.text() if self.failures.estimate else None
-        if self.failure is not None:
-            share = percent(self.failure)
+            mixing = f": any mixture of them is {'one' if self.slack else 'optimal'}"
+            return f"{line} not required{mixing if self.plans > 1 else ''}"
+        lines, estimate = [f"{line} required"], self.failures.estimate
+        share = percent(self.failure) if self.failure is not None else estimate and estimate.text()
         if share:
-            line += "\nWithout a word, robots that choose by themselves "
-            line += f"fail in {share} of all runs."
-        fewest = f"\n{self.fewest.text()}" if self.fewest else ""
-        return f"{line}{fewest}\n\n{witness_text(self.witness)}"
+            fail = f"robots that choose by themselves fail in {share} of all runs"
+            lines.append(f"Without a word, {fail}.")
+        if self.fewest:
+            lines.append(self.fewest.text())
+        return "\n".join([*lines, "", witness_text(self.witness)])
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, InTask, public, read_coordinates_of
+from coordlang.commands.plans import plans_text
 from coordlang.commands.records import ExplainOptions
 from coordlang.commands.terminal import covered_code, echo, warn_of_failures, working
 from coordlang.execution.best_sentence import leading_sentences
@@ -188,37 +189,37 @@ class Explanation(InTask):
     def task_text(self) -> str:
         """Return the task's sentences as text, without the words."""
         used = self.used
-        total, slack = Plans.of(used.space, used.task).count, used.model.slack
-        steps = counted(used.space.cost_of(used.task)[0], "step")
-        plans = f"{counted(total, 'optimal plan')} of"
-        if slack:
-            plans = f"{counted(total, 'plan')} within slack {slack}, of at most"
+        total, most = Plans.of(used.space, used.task).count, used.space.cost_of(used.task)[0]
         number = number_of_sentences(used.space, used.word, used.start)
         said = "too many sentences to count" if number is None else counted(number, "sentence")
         leading = leading_sentences(used, SENTENCES_SHOWN)
+        listed = [words for words, _ in leading]
         lines = [
             f"The task {describe(used.space, used.task)}",
-            f"has {plans} {steps} in {said}.",
+            f"has {plans_text(total, most, used.model.slack)} in {said}.",
         ]
-        listed = [words for words, _ in leading]
         if 1 < len(listed) == number:
             meant = meaning([*map(used.plans_with, listed)])
             lines.append(meaning_text([*map(used.text, listed)], meant))
-        if self.with_demands and used.guaranteed:
-            lines.append(
-                "Each robot may choose for itself: whatever the others choose, "
-                f"it is {'a' if slack else 'an'} {used.model.kept_plan}."
-            )
         if self.with_demands:
-            shown = listed if self.only is None else [self.only]
-            for asks in self.demands(shown):
-                lines += ["", demands_text(asks)]
+            lines += self._demand_lines(listed if self.only is None else [self.only])
         else:
-            for words, open_plans in leading:
-                lines.append(f'  "{used.text(words)}" leaves {counted(open_plans, "plan")} open.')
+            for words, plans in leading:
+                lines.append(f'  "{used.text(words)}" leaves {counted(plans, "plan")} open.')
         if self.only is None and number != len(listed):
             lines.append(f"  .. and {'more' if number is None else number - len(listed)}")
         return "\n".join(lines)
+
+    def _demand_lines(self, sentences: Iterable[Sentence]) -> Iterator[str]:
+        """What sentences ask of each robot, and that it may then choose for itself."""
+        if self.used.guaranteed:
+            article = "a" if self.used.model.slack else "an"
+            yield (
+                "Each robot may choose for itself: whatever the others choose, "
+                f"it is {article} {self.used.model.kept_plan}."
+            )
+        for asks in self.demands(sentences):
+            yield f"\n{demands_text(asks)}"
 
 
 @public(ExplainOptions)

@@ -169,23 +169,31 @@ def show_export(
     found: ExportedTask | ExportedFormula | ExportedTrees, options: ExportOptions
 ) -> int:
     """Write the export, or the translated plan."""
-    output, as_json = options.output, options.as_json
-    if isinstance(found, ExportedTask) and options.translate_plan is not None:
-        path = options.translate_plan
-        plan, plans = found.translate_text(read_text(path), path), found.open_plans
-        write(json.dumps(plans.data([plan])) + "\n" if as_json else plans.ipc(plan), output)
-    elif as_json:
+    output = options.output
+    if options.as_json and options.translate_plan is None:
         write(json.dumps(found.data()) + "\n", output)
-    elif not isinstance(found, ExportedTask):
-        write(f"{found}\n" if isinstance(found, ExportedFormula) else found.xml, output)
-        if isinstance(found, ExportedFormula) and output in (None, "-"):
+    elif isinstance(found, ExportedTask):
+        _show_task(found, options)
+    elif isinstance(found, ExportedTrees):
+        write(found.xml, output)
+    else:
+        write(f"{found}\n", output)
+        if output in (None, "-"):
             symbols = counted(len(found.symbols), "symbol")
             echo(f"{symbols}; --json says which atom each stands for", err=True)
+    return covered_code(found)
+
+
+def _show_task(found: ExportedTask, options: ExportOptions) -> None:
+    output, path = options.output, options.translate_plan
+    if path is not None:
+        plan, plans = found.translate_text(read_text(path), path), found.open_plans
+        as_json = options.as_json
+        write(json.dumps(plans.data([plan])) + "\n" if as_json else plans.ipc(plan), output)
     elif output is not None and options.writes_folder:
         found.save(output)
         size = f"{counted(found.actions, 'action')} ({found.form})"
         terms = f"{counted(found.terms, 'term')} for the words"
         echo(f"written to {visible(output)}: {', '.join(WRITTEN)}: {size}, {terms}")
     else:
-        echo(found.domain + found.problem, nl=False)
-    return covered_code(found)
+        write(found.domain + found.problem, output)

@@ -20,7 +20,7 @@ from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
 from planners.loading import PlanningInstance
 from planners.pddl.formula_tree import formula_text
-from planners.pddl.lifted import Domain, StepAtom
+from planners.pddl.lifted import Atom, Domain, StepAtom
 from planners.pddl.pddl_text import domain_text, problem_text
 from planners.search.reachable import count as count_reachable
 from planners.search.search_estimate import SearchEstimate, estimate
@@ -101,9 +101,6 @@ class Inspected(Presented):
     def _lines(self) -> list[tuple[str, str]]:
         none_named = {"error": "not allowed (--unowned)"}
         fluents = f"{counted(self.facts, 'fact')}: {_counts(self.fluents)}"
-        example = f", e.g. {self.example}" if self.example else ""
-        if self.interfering and not self.example:
-            example = ", none of them possible in one state near the start"
         lines = [
             ("domain", f"{self.domain}, problem {self.problem}"),
             ("read as", self.style),
@@ -118,7 +115,7 @@ class Inspected(Presented):
             ("no effects", ", ".join(self.without_effects)),
             *([("left out", f"{', '.join(self.left_out)}: idling")] if self.left_out else []),
             ("action costs", self.costs),
-            ("interference", counted(self.interfering, "pair") + example),
+            ("interference", self._interference()),
             ("fluents", fluents if self.facts else ""),
             ("at the start", _counts(self.start) or "none is true"),
             ("statics", _counts(self.statics)),
@@ -131,6 +128,13 @@ class Inspected(Presented):
             text = f"{counted(states, 'joint state')}, {counted(steps, 'joint step')}"
             lines.append(("reachable", text))
         return [(name, text or "none") for name, text in lines]
+
+    def _interference(self) -> str:
+        pairs = counted(self.interfering, "pair")
+        if self.example:
+            return f"{pairs}, e.g. {self.example}"
+        none = ", none of them possible in one state near the start"
+        return f"{pairs}{none if self.interfering else ''}"
 
     def _subactions(self, robot: str) -> tuple[str, str]:
         schemas = self.subactions[robot]
@@ -173,7 +177,7 @@ def inspection(loaded: PlanningInstance) -> Inspected:
     idling = idling_schemas(domain)
     acting = {action.schema for action in model.actions}
     asking, formulas = _formulas(model)
-    possible = {atom.predicate for atom in (*model.codec.facts, *model.statics)}
+    fluents, statics = _predicates(model.codec.facts), _predicates(model.statics)
     idle = "where a joint action says so" if model.is_joint_action else "may idle in every step"
     rows = np.concatenate(layers)[:_LOOK_AT]
     return Inspected(
@@ -187,7 +191,7 @@ def inspection(loaded: PlanningInstance) -> Inspected:
         impossible=tuple(s.name for s in domain.schemas if s.name not in acting | idling),
         idle=dict.fromkeys(model.robots, idle),
         left_out=tuple(sorted(idling)),
-        shared=_counted(a.schema for a in model.actions if len(a.owners) > 1 and not a.parts),
+        shared=_shared(model),
         unowned=loaded.options.unowned,
         step_formulas=asking,
         formulas=formulas,
@@ -195,10 +199,10 @@ def inspection(loaded: PlanningInstance) -> Inspected:
         costs=_costs(domain, model.cost),
         interfering=model.stepper.interfering_pairs(),
         example=model.stepper.conflict_in(model.codec.facts_part(rows)),
-        fluents=_counted(fact.predicate for fact in model.codec.facts),
-        start=_counted(model.codec.facts.atoms[fact].predicate for fact in start),
-        statics=_counted(a.predicate for a in model.statics),
-        never=tuple(sorted(set(domain.predicates) - possible)),
+        fluents=fluents,
+        start=_predicates(model.codec.facts.atoms[fact] for fact in start),
+        statics=statics,
+        never=tuple(sorted(domain.predicates.keys() - fluents.keys() - statics.keys())),
         facts=len(model.codec.facts),
         goal=formula_text(loaded.problems[0].goal),
         estimate=found,
@@ -214,15 +218,22 @@ def _style(domain: Domain) -> str:
 
 
 def _subactions(model: JointModel) -> dict[str, dict[str, int]]:
-    if model.is_joint_action:
-        return {
-            robot: _counted(label[1:-1].split(" ")[0] for label in own[1:])
-            for robot, own in zip(model.robots, model.labels, strict=True)
-        }
     return {
-        robot: _counted(a.schema for a in model.actions if number in a.owners)
-        for number, robot in enumerate(model.robots)
+        robot: _counted(label[1:-1].split(" ")[0] for label in own[1:])
+        for robot, own in zip(model.robots, model.labels, strict=True)
     }
+
+
+def _shared(model: JointModel) -> dict[str, int]:
+    """How many subactions of each schema robots choose together."""
+    if model.is_joint_action:
+        return {}
+    return _counted(action.schema for action in model.actions if len(action.owners) > 1)
+
+
+def _predicates(atoms: Iterable[Atom]) -> dict[str, int]:
+    """How many atoms each predicate has."""
+    return _counted(atom.predicate for atom in atoms)
 
 
 def _objects(loaded: PlanningInstance) -> dict[str, int]:
@@ -238,17 +249,19 @@ def _objects(loaded: PlanningInstance) -> dict[str, int]:
 
 def _formulas(model: JointModel) -> tuple[dict[str, int], tuple[str, ...]]:
     """How many subactions of each schema ask something of the others, and what the first asks."""
-    touched = [(action, footprint(action)) for action in model.actions]
-    asking = [(action, own) for action, own in touched if own.partners or own.excluded]
     there = {StepAtom(action.schema, action.args) for action in model.actions}
+    asking: list[str] = []
     found: dict[tuple[str, str], str] = {}
-    for action, own in asking:
+    for action in model.actions:
+        own = footprint(action)
+        if own.partners or own.excluded:
+            asking.append(action.schema)
         for kind, others in (("speaks of", own.partners), ("forbids", own.excluded)):
             if others and (action.schema, kind) not in found:
                 # What no robot has is often a mistake in the domain.
                 named = _some(others & there) or f"{_some(others)}, which no robot can ever do,"
                 found[action.schema, kind] = f"{action.label} {kind} {named} in the same step"
-    return _counted(action.schema for action, _ in asking), tuple(found.values())
+    return _counted(asking), tuple(found.values())
 
 
 def _some(atoms: frozenset[StepAtom]) -> str:
@@ -319,16 +332,22 @@ def _this_task(found: SearchEstimate, too_large: bool) -> str:
     if found.makespan is not None:
         return f"makespan {found.makespan:,}: plans, coordination and build are feasible"
     text = f"makespan {max(found.hmax or 0, found.at_least or 0):,} at least"
-    if found.expected is not None:
-        large, by = found.expected >= 1_000_000, f"{found.factor:.1f} times the one before"
-        number = f"{found.expected:.1e}" if large else f"{float(f'{found.expected:.2g}'):,.0f}"
-        text += f": about {number} states if each layer is {by}"
     ends = "whether plans ends is not known: set a --time-limit"
     if too_large and found.solver_after is None:
         ends = "plans, and all that needs them, are not likely to end"
     elif not too_large and found.expected is not None:
         ends = "plans ends in seconds to minutes if the makespan is not much more"
-    return f"{text}; {ends}"
+    return f"{text}{_growth(found)}; {ends}"
+
+
+def _growth(found: SearchEstimate) -> str:
+    """How many states there may be, as far as that can be said."""
+    if found.expected is None:
+        return ""
+    number = f"{float(f'{found.expected:.2g}'):,.0f}"
+    if found.expected >= 1_000_000:
+        number = f"{found.expected:.1e}"
+    return f": about {number} states if each layer is {found.factor:.1f} times the one before"
 
 
 def _all_tasks(states: int) -> str:

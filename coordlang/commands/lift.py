@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import fspath
 from typing import Any
@@ -128,15 +128,7 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
     if not known:
         raise UsageError("there is no problem to learn from", remedy="Name one or more.")
     first = every[0].candidates
-    robots = first.model.robots
-    for other in (own.candidates for own in every):
-        if other.model.robots != robots:
-            others = ", ".join(other.model.robots)
-            raise BadInput(
-                f"the robots are {others}, those of {every[0].name} {', '.join(robots)}",
-                position=Position(other.loaded.problems[0].source.name),
-                remedy="Words are about robots by name: use the same names.",
-            )
+    _require_same_robots(every)
     with Jobs(options.jobs).opened() as workers:
         learned = learn(
             every[:known],
@@ -157,7 +149,7 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
         learned.features,
         learned.words,
         learned.values,
-        robots,
+        first.model.robots,
         provenance.domain,
         {key: provenance.model[key] for key in _MODEL if key in provenance.model},
         bool(first.loaded.options.names or first.loaded.options.robot_type),
@@ -165,6 +157,18 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
         _PRODUCER | {"seed": options.seed},
     )
     return Lifted(language, learned)
+
+
+def _require_same_robots(every: Sequence[Instance]) -> None:
+    robots = every[0].candidates.model.robots
+    for other in (own.candidates for own in every):
+        if other.model.robots != robots:
+            others = ", ".join(other.model.robots)
+            raise BadInput(
+                f"the robots are {others}, those of {every[0].name} {', '.join(robots)}",
+                position=Position(other.loaded.problems[0].source.name),
+                remedy="Words are about robots by name: use the same names.",
+            )
 
 
 def _instance(

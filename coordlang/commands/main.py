@@ -20,7 +20,7 @@ from typing import Any
 import click
 
 import coordlang
-from coordlang.commands.terminal import BROKEN_PIPE, INTERRUPTED, SIGNALS, echo
+from coordlang.commands.terminal import BROKEN_PIPE, SIGNALS, echo
 from planners.system.errors import CoordlangError, Note, OutOfMemory, UsageError
 from planners.system.limits import lacks_memory
 from planners.system.messages import sentence, visible
@@ -181,9 +181,7 @@ def _failure(error: BaseException, number: int | None) -> tuple[str, CoordlangEr
     memory that is used up.
     """
     if number is not None or isinstance(error, KeyboardInterrupt | click.Abort):
-        by = "" if number in (None, signal.SIGINT) else f" by {signal.Signals(number).name}"
-        made = CoordlangError(f"interrupted{by}", remedy="Start it again.")
-        made.exit_code = INTERRUPTED if number is None else SIGNALS + number
+        made = _interrupted(signal.SIGINT if number is None else number)
         return f"coordlang: {made.what}\n", made
     if isinstance(error, click.ClickException):  # what click says of the arguments
         shown, context = StringIO(), getattr(error, "ctx", None)
@@ -204,6 +202,13 @@ def _failure(error: BaseException, number: int | None) -> tuple[str, CoordlangEr
         remedy = "Use a smaller task, or a larger --memory-limit."
         made = OutOfMemory("out of memory", remedy=remedy)
     return f"coordlang: {made}\n", made
+
+
+def _interrupted(number: int) -> CoordlangError:
+    by = "" if number == signal.SIGINT else f" by {signal.Signals(number).name}"
+    made = CoordlangError(f"interrupted{by}", remedy="Start it again.")
+    made.exit_code = SIGNALS + number
+    return made
 
 
 def wants_json(arguments: Sequence[str]) -> bool:

@@ -10,11 +10,11 @@ from itertools import islice
 from typing import Any, ClassVar
 
 from coordlang.commands.inputs import Arguments, public
-from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOptions
+from coordlang.commands.records import DEFAULT_MAX, Listing, PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot, write
 from planners.search.kept_plans import search
 from planners.search.plans import Plan, Plans, Texts, texts
-from planners.system.messages import Presented
+from planners.system.messages import Presented, counted
 
 #: One plan, joint step by joint step.
 PlanSteps = tuple[Texts, ...]
@@ -136,6 +136,14 @@ def show_plans(found: OptimalPlans, options: PlansOptions) -> None:
     show_listed(found, options, found.data, "plans" if found.slack else "optimal plans")
 
 
+def plans_text(count: int, steps: int, slack: int) -> str:
+    """``4 optimal plans of 3 steps``; with slack ``9 plans within slack 1, of at most 4 steps``."""
+    if slack:
+        most = counted(steps, "step")
+        return f"{counted(count, 'plan')} within slack {slack}, of at most {most}"
+    return f"{counted(count, 'optimal plan')} of {counted(steps, 'step')}"
+
+
 def show_listed(
     found: OptimalPlans,
     options: PlansOptions | UnderstandOptions,
@@ -145,12 +153,7 @@ def show_listed(
 ) -> None:
     """Write the plans that the options list, as JSON or text, or their number."""
     listing, count = options.listing, found.count
-    listed: list[PlanSteps] = []
-    if listing.sample:
-        listed = found.sample(listing.sample, listing.seed)
-    elif not listing.only_count:
-        most = DEFAULT_MAX if listing.most is None else listing.most
-        listed = [*islice(found, min(most, sys.maxsize))]
+    listed = _listed(found, listing)
     if options.form == "json":
         data = data_of(listed)
         if listing.sample:
@@ -164,3 +167,12 @@ def show_listed(
         write("".join(files), output)
         if not listing.sample and len(listed) < count:
             echo(f"{len(listed)} of {count} {what} listed; --max N lists more", err=True)
+
+
+def _listed(found: OptimalPlans, listing: Listing) -> list[PlanSteps]:
+    if listing.only_count:
+        return []
+    if listing.sample:
+        return found.sample(listing.sample, listing.seed)
+    most = DEFAULT_MAX if listing.most is None else listing.most
+    return [*islice(found, min(most, sys.maxsize))]

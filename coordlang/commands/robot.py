@@ -96,15 +96,9 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
     if sentence is not None and options.prefer:
         raise UsageError("--prefer: the sentence is given", remedy="Leave out one of the two.")
     read = files.task(options.coordinates)
-    used, robots = read.used, read.used.model.robots
-    number, others = used.robot_number(options.robot), [r for r in robots if r != options.robot]
-    if not used.model.is_asynchronous:
-        raise UsageError(
-            "the words are for joint steps, and a process keeps no common step",
-            remedy="Build with --asynchronous.",
-        )
-    if not used.guaranteed:
-        raise Refuted("the language guarantees nothing in this task", remedy="Build one for it.")
+    used = read.used
+    number = used.robot_number(options.robot)
+    _require_guarantee(used)
     if sentence is not None:
         words = used.words_of(sentence)
         used.plans_with(words)
@@ -128,10 +122,22 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
 
     wanted(wishes)  # what is wrong with them is said now
     run = _run_of(read, options.run)
+    others = [robot for robot in used.model.robots if robot != options.robot]
     agreement = Agreement(options.robot, others, sentence, wishes, best, accepts)
     executive = Executive(run, agreement, monitor_of, options.silent_after)
     points = read_coordinates_of(options.coordinates, read.files.problems[0])
     return RobotInTask(used, executive, run, points)
+
+
+def _require_guarantee(used: TaskLanguage) -> None:
+    """Raise an error for a language that guarantees processes nothing in this task."""
+    if not used.model.is_asynchronous:
+        raise UsageError(
+            "the words are for joint steps, and a process keeps no common step",
+            remedy="Build with --asynchronous.",
+        )
+    if not used.guaranteed:
+        raise Refuted("the language guarantees nothing in this task", remedy="Build one for it.")
 
 
 def _run_of(read: ReadTask, name: str | None) -> str:
@@ -183,16 +189,7 @@ class _Loop:
         while not (is_sent and self._own.may_leave(self._now)):
             due = min(self._own.due(), math.inf if self._player is None else self._player.due)
             wait = max(0.0, due - self._now)
-            files = [self._bus.fileno(), *self._stdin]
-            ready, _, _ = select(files, [], [], wait if is_sent else _AGAIN)
-            for file in {*ready} & {*self._stdin}:
-                self._hears_driver(file)
-            try:
-                for data in self._bus.receive():
-                    self._own.hears(data, self._now)
-            except Refuted:
-                self._tells()  # so that others end, too
-                raise
+            self._hears(wait if is_sent else _AGAIN)
             self._own.tick(self._now)
             if self._player is not None:
                 self._player.act(self._own, self._now)
@@ -202,6 +199,18 @@ class _Loop:
                     "stdin ended before the robot's part was done",
                     remedy='It says what is done: {"event": 1, "done": true}; or use --play.',
                 )
+
+    def _hears(self, wait: float) -> None:
+        """Hear the driver and the other robots, as soon as one says something, or after a while."""
+        ready, _, _ = select([self._bus.fileno(), *self._stdin], [], [], wait)
+        for file in {*ready} & {*self._stdin}:
+            self._hears_driver(file)
+        try:
+            for data in self._bus.receive():
+                self._own.hears(data, self._now)
+        except Refuted:
+            self._tells()  # so that others end, too
+            raise
 
     def _tells(self) -> bool:
         """Write lines, then messages: what others know of was told to the driver before."""

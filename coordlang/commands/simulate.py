@@ -126,15 +126,14 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     require_simulator()
     task = files.task(options.coordinates)
     wished = wishes_in(options.prefer)
-    on_the_way = [text for text in wished if text.startswith(_VISIT)]
-    preferred = [text for text in wished if text not in on_the_way]
+    preferred = [text for text in wished if not text.startswith(_VISIT)]
     prepared = _prepared(task.used, options, preferred)
     points = read_coordinates_of(options.coordinates, task.files.problems[0])
     floor = Floor(prepared.world, points)
     step, most = _step(task.used, options.step), MOST_RADIUS * floor.shortest
     radius = prepared.radius_on(floor, min(settings.radius, most))
     settings = replace(settings, step=step, radius=radius)
-    wishes = [_wish(prepared, text) for text in on_the_way]
+    wishes = [_wish(prepared, text) for text in wished if text.startswith(_VISIT)]
     done: list[RunRecord] = []
 
     def work() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from os import PathLike, fspath
 from typing import Any
 from warnings import catch_warnings, simplefilter
@@ -13,12 +14,13 @@ from coordlang.commands.inputs import Arguments, extended, language_for, note_si
 from coordlang.commands.records import VerifyOptions
 from coordlang.commands.terminal import REFUTED, say, show_answer, write
 from coordlang.commands.witness import witness_data, witness_text
-from coordlang.language.candidates import require_solvable
+from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.provenance import Tolerance, tolerance_data
 from coordlang.language.recorded import check_source, recorded_candidates
+from coordlang.language.words import Partition
 from coordlang.required.failure import NONE, Failures, TooManyToCount, failures_under
 from coordlang.verification.by_definition import Verdict, verify_candidates
-from coordlang.verification.certificate_file import read_certificate
+from coordlang.verification.certificate_file import Certificate, read_certificate
 from coordlang.verification.check_certificate import Checked
 from coordlang.verification.check_certificate import check as check_certificate
 from planners.loading import PlanningInstance
@@ -175,27 +177,37 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
         partition = read.partition(candidates.model)
         note_size(candidates)
         verdict = verify_candidates(partition, candidates, workers, say)
-        found, claims = NONE, read.tolerance is not None and read.tolerance.may_fail
-        if not verdict.holds:
-            say("counting how often robots fail")
-            found = failures_under(partition, candidates, is_claimed=claims)
-            if claims and found.mean is None:
-                raise TooManyToCount(
-                    f"what the language tolerates cannot be checked: {found.why_not}",
-                    remedy="Say --tasks FILE with fewer tasks.",
-                )
+        claims = read.tolerance is not None and read.tolerance.may_fail
+        found = NONE if verdict.holds else _failures(partition, candidates, is_claimed=claims)
+    words, claimed, robots = len(read.words), read.guarantee.lower_bound, candidates.model.robots
     checked = None
     if proof and (verdict.holds or claims):
-        checked = check_certificate(proof, candidates, say)
-        if verdict.holds and checked.lower_bound > len(read.words):
-            raise AssertionError(
-                f"a language of {len(read.words)} words is verified, and a certificate that "
-                f"{checked.lower_bound} are needed: one of the two is wrong"
-            )
-    words, claimed = len(read.words), read.guarantee.lower_bound
-    robots = candidates.model.robots
+        checked = _checked(proof, candidates, words if verdict.holds else inf)
     more = (words, claimed, checked, robots, model, found, read.tolerance, str(position))
     return extended(Verification, verdict, *more)
+
+
+def _failures(partition: Partition, candidates: Candidates, *, is_claimed: bool) -> Failures:
+    """How often robots fail; `TooManyToCount` where that is claimed and cannot be counted."""
+    say("counting how often robots fail")
+    found = failures_under(partition, candidates, is_claimed=is_claimed)
+    if is_claimed and found.mean is None:
+        raise TooManyToCount(
+            f"what the language tolerates cannot be checked: {found.why_not}",
+            remedy="Say --tasks FILE with fewer tasks.",
+        )
+    return found
+
+
+def _checked(proof: Certificate, candidates: Candidates, most: float) -> Checked:
+    """What a certificate proves; `AssertionError` if that is more than the words of a language."""
+    checked = check_certificate(proof, candidates, say)
+    if checked.lower_bound > most:
+        raise AssertionError(
+            f"a language of {most} words is verified, and a certificate that "
+            f"{checked.lower_bound} are needed: one of the two is wrong"
+        )
+    return checked
 
 
 def _note_other_robots(loaded: PlanningInstance) -> None:

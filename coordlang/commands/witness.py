@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import chain
 from typing import Any
 
 import msgspec
@@ -35,18 +37,10 @@ def witness_text(witness: Miscoordination) -> str:
     those that idle are left out, and states of more than a line are shown by what changes.
     """
     robots = witness.robots
-    texts = [own or IDLE for plan in (*witness.plans, witness.mixture) for s in plan for own in s]
+    texts = [own or IDLE for step in chain(*witness.plans, witness.mixture) for own in step]
     cell = max(map(len, texts)) + max(8, max(map(len, robots)) + 4)
     is_sparse = 9 + cell * len(robots) > WIDTH
-
-    def step_line(number: int, step: Step) -> str:
-        does = [
-            f"{robot}: {own or IDLE}".ljust(cell)
-            for robot, own in zip(robots, step, strict=True)
-            if own is not None or not is_sparse
-        ]
-        return f"    {number:>3}  {''.join(does).rstrip() or 'all robots idle'}"
-
+    step_line = partial(_step_line, robots, cell, is_sparse)
     lines = [f"  task: {witness.task}"]
     if is_sparse:
         lines.append("  robots that idle in a step are left out")
@@ -58,6 +52,15 @@ def witness_text(witness: Miscoordination) -> str:
         lines.append(step_line(number + 1, step) + _MARK * (number == witness.step))
     lines.append(f"  step {witness.step + 1} breaks: {witness.reason}")
     return "\n".join(lines)
+
+
+def _step_line(robots: Sequence[str], cell: int, is_sparse: bool, number: int, step: Step) -> str:
+    does = [
+        f"{robot}: {own or IDLE}".ljust(cell)
+        for robot, own in zip(robots, step, strict=True)
+        if own is not None or not is_sparse
+    ]
+    return f"    {number:>3}  {''.join(does).rstrip() or 'all robots idle'}"
 
 
 def _plan_lines(witness: Miscoordination, step_line: Callable[[int, Step], str]) -> Iterator[str]:
@@ -79,9 +82,8 @@ def _state_text(before: str | None, state: str) -> str:
     if before is None or len(text) + 4 <= WIDTH:
         return text
     old, new = split_atoms(before), split_atoms(state)
-    parts = {
-        "now": " ".join(atom for atom in new if atom not in old),
-        "no longer": " ".join(atom for atom in old if atom not in new),
-    }
-    changes = [f"{what} {atoms}" for what, atoms in parts.items() if atoms]
+    changes = []
+    for what, atoms, others in (("now", new, old), ("no longer", old, new)):
+        if own := [atom for atom in atoms if atom not in others]:
+            changes.append(f"{what} {' '.join(own)}")
     return ", ".join(changes) or "nothing has changed"
