@@ -96,6 +96,15 @@ class EngineOptions:
     sentence: str | Sequence[str] | None = None
     plan_kind: Any = None
 
+    def __post_init__(self) -> None:
+        if self.sentence is not None and self.language is None:
+            raise UsageError("a sentence needs its language", remedy="Give language, too.")
+        if self.plan_kind not in (None, *PLAN_KINDS):
+            raise UsageError(
+                f"there is no kind of plans {self.plan_kind}",
+                remedy="Plans are partial-order, sequential or time-triggered.",
+            )
+
     @classmethod
     def of(cls, **given: Any) -> EngineOptions:
         """Check the engine's parameters; objects and types may be given by their names.
@@ -117,17 +126,9 @@ class EngineOptions:
             for name, kind in _KINDS.items():
                 if given.get(name) is not None:
                     given[name] = checked_argument(name, kind, given[name])
-            options = cls(model, **{**given, "language": _read(given.get("language"))})
-            if options.sentence is not None and options.language is None:
-                raise UsageError("a sentence needs its language", remedy="Give language, too.")
-            if options.plan_kind not in (None, *PLAN_KINDS):
-                raise UsageError(
-                    f"there is no kind of plans {options.plan_kind}",
-                    remedy="Plans are partial-order, sequential or time-triggered.",
-                )
+            return cls(model, **{**given, "language": _read(given.get("language"))})
         except (BadInput, UsageError) as error:
             raise UPUsageError(in_parameters(error)) from None
-        return options
 
     def model_options(self, found: Translated) -> ModelOptions:
         """How a translated problem is to be understood.
@@ -379,16 +380,14 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 )
                 if not verdict.valid:
                     return self._refuted(verdict, steps)
-                wrong_sentence = self._wrong_sentence(found, texts)
+                if wrong_sentence := self._wrong_sentence(found, texts):
+                    return self._invalid(wrong_sentence, None)
         except NoSteps as error:
-            reason = Reason.INAPPLICABLE_ACTION if error.action else Reason.MUTEX_CONFLICT
-            return self._invalid(str(error), reason, error.action)
+            return self._invalid(str(error), error.reason, error.action)
         except Unsupported as error:
             raise UPUnsupportedProblemTypeError(in_parameters(error)) from error
         except CoordlangError as error:
             raise UPUsageError(in_parameters(error)) from error
-        if wrong_sentence is not None:
-            return self._invalid(wrong_sentence, None)
         metrics = {"makespan": str(len(steps))}
         if leaves_steps_open(plan):
             messages.append(_warning(_OPEN))

@@ -16,6 +16,7 @@ from itertools import chain, pairwise, product
 from typing import Any
 
 import networkx
+from unified_planning.engines import FailedValidationReason as Reason
 from unified_planning.plans import (
     ActionInstance,
     PartialOrderPlan,
@@ -36,12 +37,13 @@ class NoSteps(Exception):
     """A plan that is no sequence of joint steps of the problem.
 
     Because of ``action``, which is none of the problem's; or, where this is None, because a robot
-    does two things at once or the order has a cycle.
+    does two things at once or the order has a cycle.  ``reason`` is what unified-planning calls it.
     """
 
     def __init__(self, why: str, action: Any = None) -> None:
         super().__init__(why)
         self.action = action
+        self.reason = Reason.INAPPLICABLE_ACTION if action else Reason.MUTEX_CONFLICT
 
 
 def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: Any) -> Any:
@@ -127,9 +129,8 @@ def label(found: Translated, action: Any) -> str:
 
     Raises `NoSteps` for an action that is none of the problem's.
     """
-    agent = action.agent and next(
-        (name for name, a in found.agents.items() if a.name == action.agent.name), None
-    )
+    agents = {own.name: name for name, own in found.agents.items()}
+    agent = action.agent and agents.get(action.agent.name)
     schemas = (s for s, members in found.schemas.items() if members.get(agent) == action.action)
     names = {thing: name for name, thing in found.objects.items()}
     values = [v.object() if v.is_object_exp() else None for v in action.actual_parameters]
@@ -148,10 +149,9 @@ def _parts(
     """
     if not model.is_joint_action:
         name, *args = text[1:-1].split()
-        schema = next(s for s in found.domain.schemas if s.name == name)
-        return [(robot, text) for robot in team.owners(schema, tuple(args))]
+        schemas = {schema.name: schema for schema in found.domain.schemas}
+        return [(robot, text) for robot in team.owners(schemas[name], tuple(args))]
     ground = next((ground for ground in model.actions if ground.label == text), None)
     if ground is None:
         raise NoSteps(f"{action} is never possible", action)
-    parts = ((robot, ground.part_of(robot)) for robot in range(len(model.robots)))
-    return [(robot, part) for robot, part in parts if part is not None]
+    return [(robot, part) for robot, part in enumerate(ground.parts) if part is not None]

@@ -66,6 +66,14 @@ _OPERATORS = {
     OperatorKind.EXISTS: "exists",
     OperatorKind.FORALL: "forall",
 }
+#: What an action is given, by the parameter, and an example.
+_EXAMPLES: dict[str, tuple[Any, str]] = {
+    "subactions": (Mapping, '{"r1": "(move ?a ?b)"}'),
+    "concurrency": (str, '"(forall (?o - agent) (not (take ?o)))"'),
+}
+_QUANTIFIERS = ("exists", "forall")
+#: Kinds of expressions about values, which other ones combine.
+_ATOMIC = (OperatorKind.FLUENT_EXP, OperatorKind.DOT, OperatorKind.EQUALS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +112,7 @@ def translate(
     to no action, `BadInput` for a problem without a robot.
     """
     subactions, concurrency = subactions or {}, concurrency or {}
-    if type(problem) not in (Problem, MultiAgentProblem):
-        raise refused(f"a {type(problem).__name__} is not supported")
-    if type(problem) is MultiAgentProblem and not problem.agents:
-        raise BadInput("the problem has no agent", remedy="Add one: problem.add_agent(..).")
-    if others := problem.kind.features - FEATURES - _METRICS:
-        raise refused(f"not supported: {', '.join(sorted(others))}")
+    _check_problem(problem)
     _check_parameters(problem, subactions, concurrency)
     writer = _Writer(problem, concurrency)
     domain_text, problem_text, schemas = writer.write(subactions)
@@ -125,26 +128,36 @@ def translate(
     )
 
 
+def _check_problem(problem: Any) -> None:
+    """Raise `Unsupported` for a problem that is not read, `BadInput` for one without an agent."""
+    if type(problem) not in (Problem, MultiAgentProblem):
+        raise refused(f"a {type(problem).__name__} is not supported")
+    if type(problem) is MultiAgentProblem and not problem.agents:
+        raise BadInput("the problem has no agent", remedy="Add one: problem.add_agent(..).")
+    if others := problem.kind.features - FEATURES - _METRICS:
+        raise refused(f"not supported: {', '.join(sorted(others))}")
+
+
 def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurrency) -> None:
     """Raise `UsageError` for subactions and formulas that no action of the problem can have."""
     agents = getattr(problem, "agents", ())
-    if subactions if agents else concurrency:
-        given = "subactions, with" if agents else "concurrency, without"
+    own, other = ("concurrency", "subactions") if agents else ("subactions", "concurrency")
+    given: dict[str, Mapping[str, Any]] = {"subactions": subactions, "concurrency": concurrency}
+    if given[other]:
         raise UsageError(
-            f"a problem is given {given} agents",
+            f"a problem is given {other}, {'with' if agents else 'without'} agents",
             remedy="Give concurrency where actions are agents' own, and subactions elsewhere.",
         )
     names = sorted({action.name for owner in agents or (problem,) for action in owner.actions})
-    parameter = "concurrency" if agents else "subactions"
-    example = '"(forall (?o - agent) (not (take ?o)))"' if agents else '{"r1": "(move ?a ?b)"}'
-    for name, value in {**subactions, **concurrency}.items():
+    kind, example = _EXAMPLES[own]
+    for name, value in given[own].items():
         if name not in names:
             what, remedy = f"there is no action {name!r}", f"The actions are {', '.join(names)}."
-        elif not isinstance(value, str if agents else Mapping):
+        elif not isinstance(value, kind):
             what, remedy = f"{value!r} for {name!r}", f"Write {example}."
         else:
             continue
-        raise UsageError(f"{parameter}: {what}", remedy=remedy)
+        raise UsageError(f"{own}: {what}", remedy=remedy)
 
 
 class _Bound(NamedTuple):
@@ -362,27 +375,30 @@ class _Writer:
         """An assignment: what it makes true and what false, each under its condition."""
         if not effect.is_assignment():
             raise refused(f"the effect {effect} is no assignment")
-        fluent, value, bound = effect.fluent.fluent(), effect.value, list[_Bound]()
         when = [] if effect.condition.is_true() else [self.text(effect.condition, agent, True)]
-        parts = self.parts(effect.fluent, agent, bound, True)
-        cases: list[tuple[str, list[str], list[_Bound]]]
-        if fluent.type.is_user_type():
-            new, old = self.term(value, agent, bound, True), self.value(fluent, parts)
-            cases = [(_listed(*parts, new), [], bound)]
-            differs = f"(not (= {old.variable} {new}))"
-            cases += [(f"(not {old.atom})", [differs], [*bound, old])]
-        elif value.is_bool_constant():
-            atom = _listed(*parts)
-            cases = [(atom if value.is_true() else f"(not {atom})", [], bound)]
-        else:
-            atom, holds = _listed(*parts), self.text(value, agent, True)
-            cases = [(atom, [holds], bound), (f"(not {atom})", [f"(not {holds})"], bound)]
-        for literal, own, variables in cases:
+        for literal, own, variables in self.cases(effect, agent):
             conditions = [*(b.atom for b in variables), *when, *own]
             text = f"(when (and {' '.join(conditions)}) {literal})" if conditions else literal
             declared = [self.declarations(effect.forall), *(b.declared for b in variables)]
             quantified = " ".join(filter(None, declared))
             yield f"(forall ({quantified}) {text})" if quantified else text
+
+    def cases(self, effect: Any, agent: Any) -> list[tuple[str, list[str], list[_Bound]]]:
+        """The literals that an assignment makes true, with conditions of their own, and values."""
+        fluent, value, bound = effect.fluent.fluent(), effect.value, list[_Bound]()
+        parts = self.parts(effect.fluent, agent, bound, True)
+        if fluent.type.is_user_type():
+            new, old = self.term(value, agent, bound, True), self.value(fluent, parts)
+            differs = f"(not (= {old.variable} {new}))"
+            return [
+                (_listed(*parts, new), [], bound),
+                (f"(not {old.atom})", [differs], [*bound, old]),
+            ]
+        atom = _listed(*parts)
+        if value.is_bool_constant():
+            return [(atom if value.is_true() else f"(not {atom})", [], bound)]
+        holds = self.text(value, agent, True)
+        return [(atom, [holds], bound), (f"(not {atom})", [f"(not {holds})"], bound)]
 
     def facts(self) -> list[str]:
         """The atoms that are true at the start."""
@@ -404,23 +420,30 @@ class _Writer:
         """
         if node.is_bool_constant():
             return "(and)" if node.is_true() else "(or)"
-        if node.is_fluent_exp() or node.is_dot():
-            bound: list[_Bound] = []
-            parts = self.parts(node, agent, bound, inside)
-            return _with(_listed(*parts), bound)
-        if node.is_equals():
-            bound = []
-            sides = [self.term(arg, agent, bound, inside) for arg in node.args]
-            return _with(_listed("=", *sides), bound)
+        if node.node_type in _ATOMIC:
+            return self.atomic(node, agent, inside)
         parts = [self.text(arg, agent, inside) for arg in node.args]
         if node.is_iff():
             return f"(and (imply {parts[0]} {parts[1]}) (imply {parts[1]} {parts[0]}))"
         operator = _OPERATORS.get(node.node_type)
         if operator is None:
             raise refused(f"the expression {node}")
-        if node.is_exists() or node.is_forall():
+        if operator in _QUANTIFIERS:
             parts = [f"({self.declarations(node.variables())})", *parts]
         return _listed(operator, *parts)
+
+    def atomic(self, node: Any, agent: Any, inside: bool) -> str:
+        """An atom, or an equation, about the values of the object fluents in it."""
+        bound: list[_Bound] = []
+        if node.is_equals():
+            words = ["=", *(self.term(arg, agent, bound, inside) for arg in node.args)]
+        else:
+            words = self.parts(node, agent, bound, inside)
+        if not bound:
+            return _listed(*words)
+        declared = " ".join(value.declared for value in bound)
+        atoms = " ".join(value.atom for value in bound)  # each fluent has exactly one value
+        return f"(exists ({declared}) (and {atoms} {_listed(*words)}))"
 
     def parts(self, node: Any, agent: Any, bound: list[_Bound], inside: bool) -> list[str]:
         """The predicate of a fluent and its arguments, without the value of an object fluent.
@@ -428,16 +451,16 @@ class _Writer:
         What arguments are values of object fluents is added to ``bound``.  Of ``Dot(other, ..)``
         the fluent is the other agent's, and its arguments are read as they are without.
         """
-        owner = self.problem.agent(node.agent()) if node.is_dot() else agent
-        variable = inside and not node.is_dot()
-        node = node.arg(0) if node.is_dot() else node
+        owner, is_variable = agent, inside
+        if node.is_dot():
+            owner, is_variable, node = self.problem.agent(node.agent()), False, node.arg(0)
         fluent = node.fluent()
         own = owner if owner is not None and fluent in owner.fluents else None
         if own is None and fluent not in self.shared:
             raise refused(f"fluent {fluent.name!r}, another agent's own, without Dot")
         args = [self.term(arg, agent, bound, inside) for arg in node.args]
         if own is not None:
-            args.insert(0, AGENT if variable else self.agent_name(own))
+            args.insert(0, AGENT if is_variable else self.agent_name(own))
         return [self.predicate(fluent, own), *args]
 
     def value(self, fluent: Any, parts: Sequence[str]) -> _Bound:
@@ -464,14 +487,6 @@ def _section(begin: str, lines: Iterable[str]) -> str:
     return "\n".join([begin, *(f"  {line}" for line in lines), ")"])
 
 
-def _with(text: str, bound: Sequence[_Bound]) -> str:
-    """A formula about values of object fluents: each fluent has exactly one."""
-    if not bound:
-        return text
-    declared = " ".join(value.declared for value in bound)
-    return f"(exists ({declared}) (and {' '.join(value.atom for value in bound)} {text}))"
-
-
 def _clashes(action: Any) -> Iterator[Any]:
     """Conditions without which an object fluent gets two values at once.
 
@@ -483,19 +498,23 @@ def _clashes(action: Any) -> Iterator[Any]:
     for one, two in combinations_with_replacement(objects, 2):
         if one.fluent.fluent() != two.fluent.fluent():
             continue
-        others = [Variable(f"{v.name}'", v.type, v.environment) for v in two.forall]
-        renamed = {
-            new.VariableExp(v): new.VariableExp(o) for v, o in zip(two.forall, others, strict=True)
-        }
-        target, value, when = (
-            n.substitute(renamed) for n in (two.fluent, two.value, two.condition)
-        )
+        others, target, value, when = _renamed(two)
         same = [new.Equals(a, b) for a, b in zip(one.fluent.args, target.args, strict=True)]
         values = new.And(*same, new.Not(new.Equals(one.value, value)))
         if not values.simplify().is_false():
             clash = new.And(one.condition, when, values)
             variables = (*one.forall, *others)
             yield new.Not(new.Exists(clash, *variables) if variables else clash)
+
+
+def _renamed(effect: Any) -> tuple[list[Variable], Any, Any, Any]:
+    """Other variables for those of an effect; and its fluent, value and condition with them."""
+    new = effect.fluent.environment.expression_manager
+    others = [Variable(f"{v.name}'", v.type, v.environment) for v in effect.forall]
+    variables = [*map(new.VariableExp, effect.forall)]
+    renamed = dict(zip(variables, map(new.VariableExp, others), strict=True))
+    parts = (effect.fluent, effect.value, effect.condition)
+    return others, *(part.substitute(renamed) for part in parts)
 
 
 def refused(what: str) -> Unsupported:
