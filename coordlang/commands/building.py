@@ -28,11 +28,7 @@ from coordlang.verification.check_certificate import check as check_certificate
 from coordlang.verification.make_certificate import certify
 from coordlang.vocabulary import METHODS, Job, Outcome
 from coordlang.vocabulary.few_words import few_words
-from coordlang.vocabulary.first_differences import (
-    FirstDifferences,
-    differences,
-    first_differences,
-)
+from coordlang.vocabulary.first_differences import FirstDifferences, differences, first_differences
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.greedy import first_language
 from coordlang.vocabulary.job import Assignment

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
 from importlib import import_module
 from typing import Any, get_args, get_origin
 
@@ -35,73 +34,60 @@ _EXAMPLES = {
 FILE = click.Path(readable=False)
 
 
-def command_of(record: type[CommandOptions]) -> click.Command:
-    """Make a command whose help is the docstring of its record.
+class Command(click.Command):
+    """A command of an options ``record``, whose docstring is the help.
 
-    Its module is loaded when it is called: there are the function of its name, made by
+    Its module is loaded when it is called: there are its function, made by
     `coordlang.commands.inputs.public`, and ``show_NAME``, which gets the result and the options,
-    writes, and returns the exit code, None for 0.
+    writes, and returns the exit code, None for 0.  The help has the options that are used most
+    first, the others by kind.
     """
-    hidden = "" if record.keeps_plans else "no_cache"
-    on_cli = {o.name: o for o in options_of(record) if o.only != "python" and o.name != hidden}
-    argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
-    params = [*([argument] if record.takes else []), *map(_click_option, on_cli.values())]
-    example = f"\b\nExample:\n  coordlang {record.name} {record.example.format(**_EXAMPLES)}"
-    called = partial(_called, record, on_cli)
-    made = _Command(
-        record.name, params=params, callback=called, help=record.__doc__, epilog=example
-    )
-    made.used = tuple(record.used.split())
-    return made
 
+    def __init__(self, record: type[CommandOptions]) -> None:
+        hidden = "" if record.keeps_plans else "no_cache"
+        on_cli = [o for o in options_of(record) if o.only != "python" and o.name != hidden]
+        self.record, self.on_cli = record, {each.name: each for each in on_cli}
+        argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
+        super().__init__(
+            record.name,
+            params=[*([argument] if record.takes else []), *map(_click_option, on_cli)],
+            callback=self._called,
+            help=record.__doc__,
+            epilog=f"\b\nExample:\n  coordlang {record.name} {record.example.format(**_EXAMPLES)}",
+        )
 
-def _called(
-    record: type[CommandOptions],
-    on_cli: Mapping[str, Option],
-    arguments: tuple[str, ...] = (),
-    **values: object,
-) -> int | None:
-    """Call the function of a command and show the result; the exit code, None for 0."""
-    from coordlang.commands.inputs import Arguments
+    def _called(self, arguments: tuple[str, ...] = (), **values: object) -> int | None:
+        """Call the function and show the result; the exit code, None for 0."""
+        from coordlang.commands.inputs import Arguments
 
-    context = click.get_current_context()
-    said = click.core.ParameterSource.COMMANDLINE
-    given = {k: v for k, v in values.items() if context.get_parameter_source(k) is said}
-    read = _positional(record, arguments, given, on_cli)
-    if "as_json" in given and "form" in on_cli:
-        _take_json_for_form(given)
-    module = import_module(f"coordlang.commands.{record.module}")
-    options = record_from(record, given, record.name, on_cli=True)
-    with limited(options.limits), _keeping(options), _said(given.get("resume")):
-        with working(record.doing) as context.meta[SAYING]:
-            files = [(each, given[each.name]) for each in on_cli.values() if each.name in given]
-            check_outputs(*_files(arguments, files, options))
-            function = getattr(module, record.function).__wrapped__
-            found = function(Arguments(getattr(options, "source", Source()), read), options)
-        shown: int | None = getattr(module, f"show_{record.name}")(found, options)
-        return shown
-
-
-def _take_json_for_form(given: dict[str, object]) -> None:
-    """Take ``--json`` for ``--format json``; `click.UsageError` beside another format."""
-    if given.setdefault("form", "json") != "json":
-        short = "--json is short for --format json"
-        raise click.UsageError(f"{short}: leave out --format {given['form']}")
-
-
-class _Command(click.Command):
-    """A command whose help has the options that are ``used`` most first, the others by kind."""
-
-    used: tuple[str, ...] = ()
+        record, context = self.record, click.get_current_context()
+        said = click.core.ParameterSource.COMMANDLINE
+        given = {k: v for k, v in values.items() if context.get_parameter_source(k) is said}
+        read = self._positional(arguments, given)
+        has_form = "as_json" in given and "form" in self.on_cli
+        if has_form and given.setdefault("form", "json") != "json":
+            short = "--json is short for --format json"
+            raise click.UsageError(f"{short}: leave out --format {given['form']}")
+        module = import_module(f"coordlang.commands.{record.module}")
+        options = record_from(record, given, record.name, on_cli=True)
+        with limited(options.limits), _keeping(options), _said(given.get("resume")):
+            with working(record.doing) as context.meta[SAYING]:
+                files = [(own, given[name]) for name, own in self.on_cli.items() if name in given]
+                check_outputs(*_files(arguments, files, options))
+                function = getattr(module, record.function).__wrapped__
+                found = function(Arguments(getattr(options, "source", Source()), read), options)
+            shown: int | None = getattr(module, f"show_{record.name}")(found, options)
+            return shown
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options under four titles."""
         sections: dict[str, list[tuple[str, str]]]
         sections = {"Most used": [], "Options": [], "Model": [], "Work and limits": []}
         title_of = {"no_cache": "Work and limits"}
         kinds = {Source: "Model", Jobs: "Work and limits", Limits: "Work and limits"}
         for kind, title in kinds.items():
             title_of |= {each.name: title for each in options_of(kind)}
-        title_of |= dict.fromkeys(self.used, "Most used")
+        title_of |= dict.fromkeys(self.record.used.split(), "Most used")
         for param in self.get_params(ctx):
             if (row := param.get_help_record(ctx)) is not None:
                 sections[title_of.get(param.name or "", "Options")].append(row)
@@ -110,34 +96,30 @@ class _Command(click.Command):
                 with formatter.section(title):
                     formatter.write_dl(rows)
 
+    def _positional(
+        self, arguments: tuple[str, ...], given: Mapping[str, object]
+    ) -> dict[str, object]:
+        """The arguments that are given, by what usage calls them; those of ``..S...`` as a tuple.
 
-def _positional(
-    record: type[CommandOptions],
-    arguments: tuple[str, ...],
-    given: Mapping[str, object],
-    options: Mapping[str, Option],
-) -> dict[str, object]:
-    """The arguments that are given, by what usage calls them; those of ``..S...`` as a tuple.
-
-    One in brackets may be left out.  ``--factored`` stands for DOMAIN and PROBLEM.  Raises
-    `click.UsageError` for too few or too many.
-    """
-    is_factored, takes = "factored" in given, record.takes
-    if record.alone in given:
-        if arguments or is_factored:
-            alone = f"{options[record.alone].spelling} {options[record.alone].metavar} alone"
-            raise click.UsageError(f"expected {alone}, without {takes}")
-        return {}
-    names = _beside_pddl(takes) if is_factored else takes.split()
-    said = " ".join(names)
-    least, is_open = len(names) - said.count("["), said.endswith("...")
-    most = len(arguments) if is_open else len(names)
-    if not least <= len(arguments) <= most:
-        raise click.UsageError(f"expected {_usage(takes)}")
-    read: dict[str, object] = dict(zip(names, arguments, strict=False))
-    if is_open:
-        read[names[-1]] = arguments[len(names) - 1 :]
-    return {name.strip("[]"): value for name, value in read.items()}
+        One in brackets may be left out.  ``--factored`` stands for DOMAIN and PROBLEM.  Raises
+        `click.UsageError` for too few or too many.
+        """
+        is_factored, takes = "factored" in given, self.record.takes
+        if (alone := self.record.alone) in given:
+            if arguments or is_factored:
+                said = f"{self.on_cli[alone].spelling} {self.on_cli[alone].metavar} alone"
+                raise click.UsageError(f"expected {said}, without {takes}")
+            return {}
+        names = _beside_pddl(takes) if is_factored else takes.split()
+        usage = " ".join(names)
+        least, is_open = len(names) - usage.count("["), usage.endswith("...")
+        most = len(arguments) if is_open else len(names)
+        if not least <= len(arguments) <= most:
+            raise click.UsageError(f"expected {_usage(takes)}")
+        read: dict[str, object] = dict(zip(names, arguments, strict=False))
+        if is_open:
+            read[names[-1]] = arguments[len(names) - 1 :]
+        return {name.strip("[]"): value for name, value in read.items()}
 
 
 def _beside_pddl(takes: str) -> list[str]:

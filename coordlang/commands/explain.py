@@ -36,12 +36,7 @@ from coordlang.explanation.words import (
 )
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
-from coordlang.language.sentences import (
-    Sentence,
-    TaskSentence,
-    number_of_sentences,
-    task_sentences,
-)
+from coordlang.language.sentences import Sentence, TaskSentence, number_of_sentences, task_sentences
 from planners.joint.model import show
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans

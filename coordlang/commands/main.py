@@ -79,10 +79,10 @@ class _LazyGroup(click.Group):
             from coordlang.commands.schema import command
 
             return command
-        from coordlang.commands.command import command_of
+        from coordlang.commands.command import Command
         from coordlang.commands.records import record_of
 
-        return command_of(record_of(cmd_name))
+        return Command(record_of(cmd_name))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         for title, group in GROUPS.items():

@@ -209,11 +209,7 @@ class Listing:
         False, "Print the number of plans only.", names="--count", without="most sample"
     )
     most: int | None = cli_option(
-        None,
-        f"List so many plans (default: {DEFAULT_MAX}).",
-        "N",
-        names="--max",
-        least=0,
+        None, f"List so many plans (default: {DEFAULT_MAX}).", "N", names="--max", least=0
     )
     sample: int | None = cli_option(
         None, "Draw N plans uniformly instead of the first ones.", "N", least=1, without="most"
