@@ -66,13 +66,10 @@ if TYPE_CHECKING:
 __version__ = "1.0.0"
 
 #: Modules of `coordlang.commands` with one function each, of the same name.
-_COMMANDS = (
-    *("inspect", "check", "coordination", "build", "verify", "choices", "simulate", "explain"),
-    *("plans", "export"),
-)
+_COMMANDS = "inspect check coordination build verify choices simulate explain plans export"
 #: Module -> the public names that it defines.
 _DEFINED_IN = {
-    **{f"coordlang.commands.{name}": name for name in _COMMANDS},
+    **{f"coordlang.commands.{name}": name for name in _COMMANDS.split()},
     "coordlang.commands.lift": "lift ground",
     "coordlang.commands.sentences": "say understand plan",
     "coordlang.commands.inputs": "load load_language",

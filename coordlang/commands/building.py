@@ -152,8 +152,7 @@ def _few_words(making: Making, words: int, *, worst: bool, seed: int) -> Built:
         if not isinstance(outcome.stopped, KeyboardInterrupt):
             outcome = replace(outcome, stopped=None)  # no search was left where nothing fails
     making.note("verify")
-    how_often = Failures(failures.mean, failures.worst)
-    return making.built(job, outcome, FEW_WORDS, failures=how_often)
+    return making.built(job, outcome, FEW_WORDS, failures=Failures(failures.mean, failures.worst))
 
 
 def job_for_few_words(making: Making, seed: int = 0) -> Job:
@@ -303,8 +302,7 @@ class _Old:
             with suppress(BadInput):
                 read_key(candidates.model.codec, key)
                 kept[key] = word
-        gone = len(language.states) - len(kept)
-        return cls(replace(language, states=kept), candidates, gone)
+        return cls(replace(language, states=kept), candidates, len(language.states) - len(kept))
 
     def keys(self, states: Iterable[int]) -> Iterator[tuple[int, str]]:
         """Candidate states with their keys."""
@@ -316,8 +314,7 @@ class _Old:
         old, names = self.language, dict(enumerate(self.language.words))
         new = (name for name in (f"w{n}" for n in count()) if name not in old.words)
         names |= zip(sorted({*assignment.values()} - names.keys()), new, strict=False)
-        said = {key: names[assignment[n]] for n, key in self.keys(assignment)}
-        states = {**old.states, **said}
+        states = {**old.states, **{k: names[assignment[n]] for n, k in self.keys(assignment)}}
         sizes = Counter(states.values())
         words = tuple(word for word in names.values() if sizes[word])
         default = old.default if sizes[old.default] else max(words, key=sizes.__getitem__)

@@ -110,8 +110,7 @@ class RobotsChoices(InTask):
 
     def data(self) -> dict[str, Any]:
         """The data of a choices file (docs/formats.md)."""
-        data: dict[str, Any] = msgspec.to_builtins(execution.to_record(self.found, self.chosen))
-        return data
+        return dict(msgspec.to_builtins(execution.to_record(self.found, self.chosen)))
 
     def save(self, path: File) -> None:
         """Write a choices file, for `Monitor.read` on the robot; complete or not at all."""
@@ -150,9 +149,8 @@ def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:
             share = "" if failure is None else f" in {percent(failure)} of all runs"
             said = f"choices of this task miscoordinate{share}, for example:"
         else:
-            why = "the language does not cover it"
-            if found.covered:
-                why = "the file holds no coordination language"
+            no_language = "the file holds no coordination language"
+            why = no_language if found.covered else "the language does not cover it"
             said = f"coordlang: refuted: choices of this task miscoordinate; {why}"
         echo(f"{said}\n{witness_text(found.witness)}", err=True, fit=True)
         if not is_tolerated:

@@ -155,9 +155,8 @@ def coordination(files: Arguments, options: CoordinationOptions) -> Coordination
     with options.work.opened() as workers:
         loaded = files.instance()
         found = answers(loaded, workers)
-    slack = loaded.model.slack
     tasks = tuple(
-        extended(TaskCoordination, answer, problem.source.name, slack)
+        extended(TaskCoordination, answer, problem.source.name, loaded.model.slack)
         for problem, answer in zip(loaded.problems, found, strict=True)
     )
     return Coordination(loaded.model.robots, tasks)

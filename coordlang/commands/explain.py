@@ -208,10 +208,9 @@ class Explanation(InTask):
     def _demand_lines(self, sentences: Iterable[Sentence]) -> Iterator[str]:
         """What sentences ask of each robot, and that it may then choose for itself."""
         if self.used.guaranteed:
-            article = "a" if self.used.model.slack else "an"
             yield (
                 "Each robot may choose for itself: whatever the others choose, "
-                f"it is {article} {self.used.model.kept_plan}."
+                f"it is {'a' if self.used.model.slack else 'an'} {self.used.model.kept_plan}."
             )
         for asks in self.demands(sentences):
             yield f"\n{demands_text(asks)}"

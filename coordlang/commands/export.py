@@ -53,8 +53,7 @@ class ExportedTask(InTask, PddlExport):
 
         Raises `UsageError` if it cannot be written to.
         """
-        texts = dict(zip(WRITTEN, (self.domain, self.problem), strict=True))
-        write_texts(fspath(folder), texts)
+        write_texts(fspath(folder), dict(zip(WRITTEN, (self.domain, self.problem), strict=True)))
 
     def translate_plan(self, actions: Sequence[str]) -> PlanSteps:
         """Translate a plan of the exported problem, the names of its actions, into joint steps.
@@ -188,8 +187,8 @@ def _show_task(found: ExportedTask, options: ExportOptions) -> None:
     output, path = options.output, options.translate_plan
     if path is not None:
         plan, plans = found.translate_text(read_text(path), path), found.open_plans
-        as_json = options.as_json
-        write(json.dumps(plans.data([plan])) + "\n" if as_json else plans.ipc(plan), output)
+        text = json.dumps(plans.data([plan])) + "\n" if options.as_json else plans.ipc(plan)
+        write(text, output)
     elif output is not None and options.writes_folder:
         found.save(output)
         size = f"{counted(found.actions, 'action')} ({found.form})"

@@ -12,7 +12,7 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from coordlang.commands import records as given
-from coordlang.commands.records import LoadOptions, Source, TasksSource
+from coordlang.commands.records import PlanningOptions, Source, TasksSource
 from planners.loading import PlanningInstance, build
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
@@ -249,8 +249,8 @@ def extended(kind: type[Result], found: Any, *more: object) -> Result:
     return kind(*(getattr(found, each.name) for each in fields(found)), *more)
 
 
-@public(LoadOptions)
-def load(files: Arguments, options: LoadOptions) -> PlanningInstance:
+@public(PlanningOptions)
+def load(files: Arguments, options: PlanningOptions) -> PlanningInstance:
     """Read a domain and problems, and build their joint model.
 
     The result stands for the domain and its problems in every other function, which then read and

@@ -20,7 +20,7 @@ from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
 from planners.loading import PlanningInstance
 from planners.pddl.formula_tree import formula_text
-from planners.pddl.lifted import Atom, Domain, StepAtom
+from planners.pddl.lifted import Domain, StepAtom
 from planners.pddl.pddl_text import domain_text, problem_text
 from planners.search.reachable import count as count_reachable
 from planners.search.search_estimate import SearchEstimate, estimate
@@ -177,7 +177,8 @@ def inspection(loaded: PlanningInstance) -> Inspected:
     idling = idling_schemas(domain)
     acting = {action.schema for action in model.actions}
     asking, formulas = _formulas(model)
-    fluents, statics = _predicates(model.codec.facts), _predicates(model.statics)
+    fluents = _counted(fact.predicate for fact in model.codec.facts)
+    statics = _counted(atom.predicate for atom in model.statics)
     idle = "where a joint action says so" if model.is_joint_action else "may idle in every step"
     rows = np.concatenate(layers)[:_LOOK_AT]
     return Inspected(
@@ -200,7 +201,7 @@ def inspection(loaded: PlanningInstance) -> Inspected:
         interfering=model.stepper.interfering_pairs(),
         example=model.stepper.conflict_in(model.codec.facts_part(rows)),
         fluents=fluents,
-        start=_predicates(model.codec.facts.atoms[fact] for fact in start),
+        start=_counted(model.codec.facts.atoms[fact].predicate for fact in start),
         statics=statics,
         never=tuple(sorted(domain.predicates.keys() - fluents.keys() - statics.keys())),
         facts=len(model.codec.facts),
@@ -231,20 +232,13 @@ def _shared(model: JointModel) -> dict[str, int]:
     return _counted(action.schema for action in model.actions if len(action.owners) > 1)
 
 
-def _predicates(atoms: Iterable[Atom]) -> dict[str, int]:
-    """How many atoms each predicate has."""
-    return _counted(atom.predicate for atom in atoms)
-
-
 def _objects(loaded: PlanningInstance) -> dict[str, int]:
     """How many objects each type has; untyped ones count as ``object``."""
-    domain = loaded.domain
-    types = [
-        frozenset().union(*(domain.supertypes(t) for t in own))
-        - ({"object"} if own != ("object",) else set())
-        for own in loaded.problems[0].objects.values()
-    ]
-    return _counted(t for own in types for t in own)
+    found: list[str] = []
+    for own in loaded.problems[0].objects.values():
+        types = {t for each in own for t in loaded.domain.supertypes(each)}
+        found += types if own == ("object",) else types - {"object"}
+    return _counted(found)
 
 
 def _formulas(model: JointModel) -> tuple[dict[str, int], tuple[str, ...]]:

@@ -180,13 +180,17 @@ def _failure(error: BaseException, number: int | None) -> tuple[str, CoordlangEr
     none has.  Where one has, it is what ended the work, whatever error a library made of it.  So is
     memory that is used up.
     """
-    if number is not None or isinstance(error, KeyboardInterrupt | click.Abort):
-        made = _interrupted(signal.SIGINT if number is None else number)
+    if isinstance(error, KeyboardInterrupt | click.Abort):
+        number = number or signal.SIGINT
+    if number is not None:
+        by = "" if number == signal.SIGINT else f" by {signal.Signals(number).name}"
+        made = CoordlangError(f"interrupted{by}", remedy="Start it again.")
+        made.exit_code = SIGNALS + number
         return f"coordlang: {made.what}\n", made
     if isinstance(error, click.ClickException):  # what click says of the arguments
-        shown, context = StringIO(), getattr(error, "ctx", None)
+        shown = StringIO()
         error.show(file=shown)
-        path = context.command_path if context is not None else "coordlang"
+        path = getattr(getattr(error, "ctx", None), "command_path", "coordlang")
         made = UsageError(error.format_message(), remedy=f"See `{path} --help`.")
         return sentence(shown.getvalue(), keep="\n"), made
     made = CoordlangError(
@@ -202,13 +206,6 @@ def _failure(error: BaseException, number: int | None) -> tuple[str, CoordlangEr
         remedy = "Use a smaller task, or a larger --memory-limit."
         made = OutOfMemory("out of memory", remedy=remedy)
     return f"coordlang: {made}\n", made
-
-
-def _interrupted(number: int) -> CoordlangError:
-    by = "" if number == signal.SIGINT else f" by {signal.Signals(number).name}"
-    made = CoordlangError(f"interrupted{by}", remedy="Start it again.")
-    made.exit_code = SIGNALS + number
-    return made
 
 
 def wants_json(arguments: Sequence[str]) -> bool:

@@ -160,15 +160,11 @@ class Source:
     given: frozenset[str] = frozenset()
 
 
-class PlanningOptions(CommandOptions):
-    """What a command can be asked for that reads a domain and problems."""
+class PlanningOptions(CommandOptions, takes="DOMAIN PROBLEMS..."):
+    """What a command can be asked for that reads a domain and problems; and `coordlang.load`."""
 
     # Plans are optimal and in step, or a language file says what they are.
     source: Source = group(Source, without="slack words_see_slack asynchronous")
-
-
-class LoadOptions(PlanningOptions, takes="DOMAIN PROBLEMS..."):
-    """What `coordlang.load` can be asked for, which no command does."""
 
 
 class JsonOptions(CommandOptions):

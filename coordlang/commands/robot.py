@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from random import Random
 from select import select  # which takes files, too
@@ -81,7 +81,8 @@ class RobotInTask(InTask):
             own.random = Random(f"{options.play} {own.robot}")
             player = Player(own.random, self.points, speed)
         with closing(opened(options.bus, self.run, own.robot, robots)) as bus:
-            _Loop(own, bus, player, write).run()
+            stdin = [] if sys.stdin is None or sys.stdin.closed else [sys.stdin.fileno()]
+            _Loop(own, bus, player, write, stdin).run()
 
 
 @public(RobotOptions)
@@ -143,8 +144,8 @@ def _require_guarantee(used: TaskLanguage) -> None:
 def _run_of(read: ReadTask, name: str | None) -> str:
     """A name of what all robots must have alike: domain, problem, language, and any given name."""
     data = {key: value for key, value in to_data(read.used.language).items() if key != "producer"}
-    same = [domain_sha256(read.files.domain), read.files.problems[0].source.sha256, data]
-    same += [] if name is None else [name]
+    problem, any_name = read.files.problems[0], [] if name is None else [name]
+    same = [domain_sha256(read.files.domain), problem.source.sha256, data, *any_name]
     return sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -160,41 +161,39 @@ def show_robot(found: RobotInTask, options: RobotOptions) -> NoReturn:
     os._exit(0)
 
 
+@dataclass(slots=True)
 class _Loop:
-    """Carries lines and messages between an executive, its driver, its bus, and the time."""
+    """Carries lines and messages between an executive, its driver, its bus, and the time.
 
-    def __init__(
-        self,
-        own: Executive,
-        bus: Bus,
-        player: Player | None,
-        write: Callable[[Mapping[str, Any]], None],
-    ) -> None:
-        self._own, self._bus, self._player, self._write = own, bus, player, write
-        self._read = b""
-        # The greatest: between the two calls this process may have had to wait for milliseconds.
-        self._since = max(time() - monotonic() for _ in range(5))
-        is_closed = sys.stdin is None or sys.stdin.closed
-        #: The file numbers of stdin, if it has not ended.
-        self._stdin = [] if is_closed else [sys.stdin.fileno()]
+    ``stdin`` has the file number of stdin until that has ended, ``unread`` what it has begun.
+    """
+
+    own: Executive
+    bus: Bus
+    player: Player | None
+    write: Callable[[Mapping[str, Any]], None]
+    stdin: list[int]
+    unread: bytes = b""
+    # The greatest: between the two calls this process may have had to wait for milliseconds.
+    since: float = field(default_factory=lambda: max(time() - monotonic() for _ in range(5)))
 
     @property
     def _now(self) -> float:
         """Seconds since the epoch, that never go back."""
-        return self._since + monotonic()
+        return self.since + monotonic()
 
     def run(self) -> None:
         """Until nobody needs the robot any more, and all that it had to say is sent."""
         is_sent = False
-        while not (is_sent and self._own.may_leave(self._now)):
-            due = min(self._own.due(), math.inf if self._player is None else self._player.due)
+        while not (is_sent and self.own.may_leave(self._now)):
+            due = min(self.own.due(), math.inf if self.player is None else self.player.due)
             wait = max(0.0, due - self._now)
             self._hears(wait if is_sent else _AGAIN)
-            self._own.tick(self._now)
-            if self._player is not None:
-                self._player.act(self._own, self._now)
+            self.own.tick(self._now)
+            if self.player is not None:
+                self.player.act(self.own, self._now)
             is_sent = self._tells()
-            if not self._stdin and self._player is None and not self._own.is_done:
+            if not self.stdin and self.player is None and not self.own.is_done:
                 raise BadInput(
                     "stdin ended before the robot's part was done",
                     remedy='It says what is done: {"event": 1, "done": true}; or use --play.',
@@ -202,23 +201,23 @@ class _Loop:
 
     def _hears(self, wait: float) -> None:
         """Hear the driver and the other robots, as soon as one says something, or after a while."""
-        ready, _, _ = select([self._bus.fileno(), *self._stdin], [], [], wait)
-        for file in {*ready} & {*self._stdin}:
+        ready, _, _ = select([self.bus.fileno(), *self.stdin], [], [], wait)
+        for file in {*ready} & {*self.stdin}:
             self._hears_driver(file)
         try:
-            for data in self._bus.receive():
-                self._own.hears(data, self._now)
+            for data in self.bus.receive():
+                self.own.hears(data, self._now)
         except Refuted:
             self._tells()  # so that others end, too
             raise
 
     def _tells(self) -> bool:
         """Write lines, then messages: what others know of was told to the driver before."""
-        lines, self._own.lines = self._own.lines, []
+        lines, self.own.lines = self.own.lines, []
         for line in lines:
-            self._write(line)
-        unsent = [to for to, data in self._own.messages() if not self._bus.send(to, data)]
-        return not [to for to in unsent if self._own.unsent(to)]
+            self.write(line)
+        unsent = [to for to, data in self.own.messages() if not self.bus.send(to, data)]
+        return not [to for to in unsent if self.own.unsent(to)]
 
     def _hears_driver(self, file: int) -> None:
         try:
@@ -226,13 +225,13 @@ class _Loop:
         except OSError:  # it cannot be read, or its terminal is closed
             read = b""
         if not read:
-            self._stdin = []
+            self.stdin = []
             read = b"\n"  # that its last line may lack
-        *lines, rest = (self._read + read).split(b"\n")
-        self._read = rest[:_CHUNK]  # nothing so long can be true
+        *lines, rest = (self.unread + read).split(b"\n")
+        self.unread = rest[:_CHUNK]  # nothing so long can be true
         for line in lines:
             if line.strip():
-                self._own.reads(line.decode(errors="replace"), self._now)
+                self.own.reads(line.decode(errors="replace"), self._now)
 
 
 class Player:

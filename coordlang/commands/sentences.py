@@ -254,11 +254,10 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
 
 def _fulfilled(preferences: Sequence[Preference], best: BestSentence) -> Iterator[Fulfilled]:
     for preference, value in zip(preferences, best.values, strict=True):
-        if isinstance(preference, str):
-            assert isinstance(value, int)
-            yield Fulfilled(preference, value)
+        if isinstance(value, int):
+            yield Fulfilled(str(preference), value)
         else:
-            assert not isinstance(value, int)
+            assert not isinstance(preference, str)
             worst, well = (preference.grades[grade] for grade in value)
             yield Fulfilled(preference.text, None, value[0] == 0, worst, well)
 

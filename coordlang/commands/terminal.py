@@ -195,8 +195,7 @@ def whatever_stderr() -> TextIO:
         except OSError:  # closed
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     encoding = sys.stderr.encoding if sys.stderr is not None else "utf-8"
-    lossy = _Lossy(_STDERR, "w", closefd=False)
-    buffer = io.BufferedWriter(lossy)  # type: ignore[type-var]
+    buffer = io.BufferedWriter(_Lossy(_STDERR, "w", closefd=False))  # type: ignore[type-var]
     return io.TextIOWrapper(buffer, encoding, errors="backslashreplace", line_buffering=True)
 
 

@@ -76,6 +76,7 @@ _MODEL = ("robots", "robot_type", "unowned", "cost", "remember_actions")
 #: The types of other parameters.
 _KINDS: Mapping[str, Any] = {
     "subactions": Mapping,
+    "concurrency": Mapping,
     "language": str | PathLike[str] | Language,
     "sentence": str | Iterable[str],
 }

@@ -404,12 +404,10 @@ class _Writer:
         """The atoms that are true at the start."""
         found = []
         for node, value in self.problem.initial_values.items():
-            agent = self.problem.agent(node.agent()) if node.is_dot() else None
-            fluent = node.arg(0) if node.is_dot() else node
             if value.is_true():
-                found.append(self.text(fluent, agent))
+                found.append(self.text(node, None))
             elif value.is_object_exp():
-                parts = self.parts(fluent, agent, [], False)
+                parts = self.parts(node, None, [], False)
                 found.append(_listed(*parts, self.object_name(value.object())))
         return sorted(found)
 

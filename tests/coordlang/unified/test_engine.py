@@ -638,7 +638,10 @@ def test_the_factory_finds_the_engine_for_several_agents() -> None:
         ({"plan_kind": PlanKind.STN_PLAN}, "partial-order"),
         *(({name: "bogus"}, "bogus") for name in ("cost", "unowned")),
         *(({name: ""}, name) for name in ("cost", "unowned")),
-        *(({name: 3}, f"{name}: expected ") for name in ("language", "sentence", "subactions")),
+        *(
+            ({n: 3}, f"{n}: expected ")
+            for n in ("language", "sentence", "subactions", "concurrency")
+        ),
         ({"remember_actions": "no"}, "remember_actions"),
         ({"robots": "r1"}, "sequence"),
         ({"robots": (1,)}, "no object or type"),
@@ -657,7 +660,7 @@ def test_wrong_parameters(params: dict[str, Any], message: str) -> None:
     """They are refused in words of the engine: nobody has typed an option of the command line."""
     with pytest.raises(UPUsageError, match=message) as refused:
         solve(lifting() if "concurrency" in params else crossing(), **params)
-    if "concurrency" in params:
+    if isinstance(params.get("concurrency"), dict):
         with pytest.raises(UPUsageError, match="without agents"):
             solve(crossing(), **params)
     assert "--" not in str(refused.value)
