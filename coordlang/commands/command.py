@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib import import_module
 from typing import Any, get_args, get_origin
 
@@ -146,17 +146,14 @@ def limited(limits: Limits) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _keeping(options: CommandOptions) -> Iterator[None]:
-    """Run a block that searches no task again that it finds in the user's cache, if it may."""
+def _keeping(options: CommandOptions) -> AbstractContextManager[None]:
+    """For a block that searches no task again that it finds in the user's cache, if it may."""
     if options.no_cache or not options.keeps_plans:
-        yield
-        return
+        return nullcontext()
     from planners.search.kept_plans import default_folder, keeping_plans, plan_store
 
     place = default_folder()
-    with keeping_plans(None if place is None else plan_store(place)):
-        yield
+    return keeping_plans(None if place is None else plan_store(place))
 
 
 @contextmanager

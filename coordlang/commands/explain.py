@@ -9,31 +9,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from coordlang.commands.inputs import Arguments, InTask, public, read_coordinates_of
+from coordlang.commands.inputs import Arguments, InTask, coordinates_of, public
 from coordlang.commands.plans import plans_text
 from coordlang.commands.records import ExplainOptions
 from coordlang.commands.terminal import covered_code, echo, warn_of_failures, working
 from coordlang.execution.best_sentence import leading_sentences
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.explanation import text as texts
+from coordlang.explanation import words as wording
 from coordlang.explanation.demands import SentenceDemands, meaning, sentence_demands
-from coordlang.explanation.text import (
-    cover_data,
-    demands_text,
-    descriptions_text,
-    meaning_text,
-    pddl_condition,
-)
-from coordlang.explanation.text import shown as formula_text
-from coordlang.explanation.words import (
-    Cover,
-    LiftedWords,
-    MappedStates,
-    WordDescriptions,
-    all_covers,
-    describe_words,
-    lifted_words,
-    mapped_states,
-)
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
 from coordlang.language.sentences import Sentence, TaskSentence, number_of_sentences, task_sentences
@@ -54,15 +38,15 @@ class WordsExplained:
     """
 
     used: TaskLanguage
-    mapped: MappedStates
-    covers: Mapping[str, Cover]
-    descriptions: WordDescriptions
-    lifted: LiftedWords | None
+    mapped: wording.MappedStates
+    covers: Mapping[str, wording.Cover]
+    descriptions: wording.WordDescriptions
+    lifted: wording.LiftedWords | None
 
     @property
     def pddl(self) -> dict[str, str]:
         """Word -> its formula as a PDDL condition."""
-        return {word: pddl_condition(cover) for word, cover in self.covers.items()}
+        return {word: texts.pddl_condition(cover) for word, cover in self.covers.items()}
 
     @property
     def states(self) -> dict[str, int]:
@@ -72,7 +56,7 @@ class WordsExplained:
     def data(self) -> dict[str, Any]:
         """Words, variables and formulas, as ``--json`` has them."""
         rules = [
-            {"word": word, "text": formula_text(cover) if cover else None}
+            {"word": word, "text": texts.shown(cover) if cover else None}
             for word, cover in self.descriptions.rules
         ]
         return {
@@ -82,7 +66,7 @@ class WordsExplained:
                 {"name": v.name, "values": [None if a is None else show(a) for a in v.values]}
                 for v in self.mapped.variables
             ],
-            "formulas": {word: cover_data(cover) for word, cover in self.covers.items()},
+            "formulas": {word: texts.cover_data(cover) for word, cover in self.covers.items()},
             "told": {"in_order": self.descriptions.in_order, "rules": rules},
             **({"lifted": self.lifted.data()} if self.lifted else {}),
         }
@@ -93,7 +77,7 @@ class WordsExplained:
         lines = [self.lifted.text(), "In this problem:"] if self.lifted else []
         if told.in_order:
             lines.append("The first formula that is true in a state gives its word:")
-        lines.append(descriptions_text(told, self.mapped))
+        lines.append(texts.descriptions_text(told, self.mapped))
         if not self.mapped.word.size:
             return "\n".join([*lines, f"No state is mapped: the word is always {default}."])
         exact = f"Exact in all {counted(len(self.mapped.word), 'mapped state')}"
@@ -143,7 +127,7 @@ class Explanation(InTask):
     @property
     def formulas(self) -> dict[str, str]:
         """Word -> its formula as text, exact by itself."""
-        return {word: formula_text(cover) for word, cover in self.words.covers.items()}
+        return {word: texts.shown(cover) for word, cover in self.words.covers.items()}
 
     def data(self) -> dict[str, Any]:
         """Words and sentences, as ``--json`` has them."""
@@ -195,7 +179,7 @@ class Explanation(InTask):
         ]
         if 1 < len(listed) == number:
             meant = meaning([*map(used.plans_with, listed)])
-            lines.append(meaning_text([*map(used.text, listed)], meant))
+            lines.append(texts.meaning_text([*map(used.text, listed)], meant))
         if self.with_demands:
             lines += self._demand_lines(listed if self.only is None else [self.only])
         else:
@@ -213,7 +197,7 @@ class Explanation(InTask):
                 f"it is {'a' if self.used.model.slack else 'an'} {self.used.model.kept_plan}."
             )
         for asks in self.demands(sentences):
-            yield f"\n{demands_text(asks)}"
+            yield f"\n{texts.demands_text(asks)}"
 
 
 @public(ExplainOptions)
@@ -227,11 +211,11 @@ def explain(files: Arguments, options: ExplainOptions) -> Explanation:
     only = None if options.sentence is None else used.words_of(options.sentence)
     if only is not None:
         used.plans_with(only)
-    mapped = mapped_states(used.partition, used.model)
-    covers = all_covers(mapped)
-    descriptions = describe_words(mapped, covers)
-    points = read_coordinates_of(None, first)
-    lifted = lifted_words(
+    mapped = wording.mapped_states(used.partition, used.model)
+    covers = wording.all_covers(mapped)
+    descriptions = wording.describe_words(mapped, covers)
+    points = coordinates_of(None, first)
+    lifted = wording.lifted_words(
         used.language, task.files.domain, first, used.model, points, task.position
     )
     words = WordsExplained(used, mapped, covers, descriptions, lifted)

@@ -328,16 +328,14 @@ def language_for(
         position,
         tasks=tasks,
         is_verified=is_verified,
-        points=read_coordinates_of(coordinates, files.problems[0]),
+        points=coordinates_of(coordinates, files.problems[0]),
         workers=Workers(),
         every_word=is_verified,
     )
     return found, position
 
 
-def read_coordinates_of(
-    given: given.CoordinatesSource | None, problem: Problem
-) -> Mapping[str, Point]:
+def coordinates_of(given: given.CoordinatesSource | None, problem: Problem) -> Mapping[str, Point]:
     """Coordinates of places: those given, else those of a file beside the problem, else none."""
     from coordlang.sites.coordinates import checked, read_coordinates
 

@@ -327,21 +327,15 @@ def _this_task(found: SearchEstimate, too_large: bool) -> str:
         return f"makespan {found.makespan:,}: plans, coordination and build are feasible"
     text = f"makespan {max(found.hmax or 0, found.at_least or 0):,} at least"
     ends = "whether plans ends is not known: set a --time-limit"
+    if found.expected is not None:
+        large, by = found.expected >= 1_000_000, f"{found.factor:.1f} times the one before"
+        number = f"{found.expected:.1e}" if large else f"{float(f'{found.expected:.2g}'):,.0f}"
+        text += f": about {number} states if each layer is {by}"
+        if not too_large:
+            ends = "plans ends in seconds to minutes if the makespan is not much more"
     if too_large and found.solver_after is None:
         ends = "plans, and all that needs them, are not likely to end"
-    elif not too_large and found.expected is not None:
-        ends = "plans ends in seconds to minutes if the makespan is not much more"
-    return f"{text}{_growth(found)}; {ends}"
-
-
-def _growth(found: SearchEstimate) -> str:
-    """How many states there may be, as far as that can be said."""
-    if found.expected is None:
-        return ""
-    number = f"{float(f'{found.expected:.2g}'):,.0f}"
-    if found.expected >= 1_000_000:
-        number = f"{found.expected:.1e}"
-    return f": about {number} states if each layer is {found.factor:.1f} times the one before"
+    return f"{text}; {ends}"
 
 
 def _all_tasks(states: int) -> str:

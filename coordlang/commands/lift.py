@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from os import fspath
 from typing import Any
 
 import coordlang
-from coordlang.commands.inputs import Arguments, PlanningInput, public, read_coordinates_of
+from coordlang.commands.inputs import Arguments, PlanningInput, coordinates_of, public
 from coordlang.commands.records import (
     File,
     GroundOptions,
@@ -25,17 +25,9 @@ from coordlang.language.candidates import require_solvable
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
 from coordlang.language.recorded import check_domain
 from coordlang.language.words import Language
+from coordlang.lifted import language as lifted_file
 from coordlang.lifted.features import english, formula
-from coordlang.lifted.language import (
-    Known,
-    LiftedLanguage,
-    Verified,
-    described,
-    grounded,
-    read_lifted,
-    require_robots,
-    to_bytes,
-)
+from coordlang.lifted.language import Known, LiftedLanguage, Verified, grounded
 from coordlang.lifted.learning import Instance, Learned, learn
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
@@ -70,7 +62,7 @@ class Lifted(Presented):
 
     def save(self, path: File) -> None:
         """Write a lifted file (gzip for ``.gz``)."""
-        write_compressed(fspath(path), to_bytes(self.language), level=6)
+        write_compressed(fspath(path), lifted_file.to_bytes(self.language), level=6)
 
     def data(self) -> dict[str, Any]:
         """The figures of the learning, as ``--json`` has them."""
@@ -128,7 +120,15 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
     if not known:
         raise UsageError("there is no problem to learn from", remedy="Name one or more.")
     first = every[0].candidates
-    _require_same_robots(every)
+    robots = first.model.robots
+    for own in every:
+        if own.candidates.model.robots != robots:
+            others = ", ".join(own.candidates.model.robots)
+            raise BadInput(
+                f"the robots are {others}, those of {every[0].name} {', '.join(robots)}",
+                position=Position(own.candidates.loaded.problems[0].source.name),
+                remedy="Words are about robots by name: use the same names.",
+            )
     with Jobs(options.jobs).opened() as workers:
         learned = learn(
             every[:known],
@@ -149,7 +149,7 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
         learned.features,
         learned.words,
         learned.values,
-        first.model.robots,
+        robots,
         provenance.domain,
         {key: provenance.model[key] for key in _MODEL if key in provenance.model},
         bool(first.loaded.options.names or first.loaded.options.robot_type),
@@ -157,18 +157,6 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
         _PRODUCER | {"seed": options.seed},
     )
     return Lifted(language, learned)
-
-
-def _require_same_robots(every: Sequence[Instance]) -> None:
-    robots = every[0].candidates.model.robots
-    for other in (own.candidates for own in every):
-        if other.model.robots != robots:
-            others = ", ".join(other.model.robots)
-            raise BadInput(
-                f"the robots are {others}, those of {every[0].name} {', '.join(robots)}",
-                position=Position(other.loaded.problems[0].source.name),
-                remedy="Words are about robots by name: use the same names.",
-            )
 
 
 def _instance(
@@ -183,7 +171,7 @@ def _instance(
             remedy="Build a language of this problem: `coordlang build --slack`.",
         )
     say(f"finding all optimal plans of {files.problems[0].name}")
-    points = read_coordinates_of(options.coordinates, files.problems[0])
+    points = coordinates_of(options.coordinates, files.problems[0])
     try:
         candidates = files.candidates(options.tasks, files.source.model)
         require_solvable(candidates)
@@ -197,7 +185,7 @@ def show_lift(found: Lifted, options: LiftOptions) -> int:
     """Write the lifted language, and print the figures."""
     stop_clock()  # the work is done; from here on it is saved
     said = json.dumps(found.data()) if options.as_json else found.text()
-    write(to_bytes(found.language), options.output, said)
+    write(lifted_file.to_bytes(found.language), options.output, said)
     what = "the best words so far are written: they are verified"
     return ended_early(found.learned.stopped, what)
 
@@ -218,12 +206,12 @@ def ground_in(
     With ``every_word`` the language has the words that no state here has, too.  Raises `BadInput`
     if the lifted language belongs to another domain or other robots.
     """
-    shape = described(lifted)
+    shape = lifted_file.described(lifted)
     check_domain(shape, files.domain, position)
     say(f"finding all optimal plans of {files.problems[0].name}")
     candidates = files.candidates(tasks, files.options_of(shape))
     require_solvable(candidates)
-    require_robots(lifted, candidates.model.robots, position)
+    lifted_file.require_robots(lifted, candidates.model.robots, position)
     states = States(World.loaded(candidates.loaded, points), candidates.rows)
     known: Known = "unknown"
     if is_verified:
@@ -247,7 +235,7 @@ def ground(arguments: Arguments, options: GroundOptions) -> Language:
     lifted = arguments.needed("LIFTED")
     own, position = lifted, Position("the lifted language")
     if not isinstance(lifted, LiftedLanguage):
-        own, position = read_lifted(fspath(lifted)), Position(fspath(lifted))
+        own, position = lifted_file.read_lifted(fspath(lifted)), Position(fspath(lifted))
     files = arguments.read()
     with Jobs(options.jobs).opened() as workers:
         language, known = ground_in(
@@ -256,7 +244,7 @@ def ground(arguments: Arguments, options: GroundOptions) -> Language:
             position,
             tasks=None if options.tasks == "own" else options.tasks,
             is_verified=options.verified,
-            points=read_coordinates_of(options.coordinates, files.problems[0]),
+            points=coordinates_of(options.coordinates, files.problems[0]),
             workers=workers,
         )
     if known == "refuted":

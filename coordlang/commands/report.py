@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from coordlang.commands.inputs import Arguments, language_for, public, read_coordinates_of
+from coordlang.commands.inputs import Arguments, coordinates_of, language_for, public
 from coordlang.commands.records import ReportOptions
 from coordlang.commands.terminal import warn_of_failures, write
 from coordlang.language.recorded import check_source
@@ -15,7 +15,7 @@ from planners.system.messages import counted, visible
 def report(arguments: Arguments, options: ReportOptions) -> Report:
     """Make the page of a language: its words, and sentences and plans of tasks."""
     files = arguments.read()
-    points = read_coordinates_of(options.coordinates, files.problems[0])
+    points = coordinates_of(options.coordinates, files.problems[0])
     read, position = language_for(arguments.needed("LANGUAGE"), files, coordinates=points)
     check_source(read, files.domain, files.problems, position)
     return make_report(

@@ -16,14 +16,7 @@ from select import select  # which takes files, too
 from time import monotonic, time
 from typing import Any, NoReturn
 
-from coordlang.commands.inputs import (
-    Arguments,
-    InTask,
-    ReadTask,
-    public,
-    read_coordinates_of,
-    wishes_in,
-)
+from coordlang.commands.inputs import Arguments, InTask, ReadTask, coordinates_of, public, wishes_in
 from coordlang.commands.records import RobotOptions
 from coordlang.commands.terminal import echo
 from coordlang.execution.best_sentence import Preference, best_sentence, grants, read_preference
@@ -97,9 +90,15 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
     if sentence is not None and options.prefer:
         raise UsageError("--prefer: the sentence is given", remedy="Leave out one of the two.")
     read = files.task(options.coordinates)
-    used = read.used
+    used, robots = read.used, read.used.model.robots
     number = used.robot_number(options.robot)
-    _require_guarantee(used)
+    if not used.model.is_asynchronous:
+        raise UsageError(
+            "the words are for joint steps, and a process keeps no common step",
+            remedy="Build with --asynchronous.",
+        )
+    if not used.guaranteed:
+        raise Refuted("the language guarantees nothing in this task", remedy="Build one for it.")
     if sentence is not None:
         words = used.words_of(sentence)
         used.plans_with(words)
@@ -123,22 +122,11 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
 
     wanted(wishes)  # what is wrong with them is said now
     run = _run_of(read, options.run)
-    others = [robot for robot in used.model.robots if robot != options.robot]
+    others = robots[:number] + robots[number + 1 :]
     agreement = Agreement(options.robot, others, sentence, wishes, best, accepts)
     executive = Executive(run, agreement, monitor_of, options.silent_after)
-    points = read_coordinates_of(options.coordinates, read.files.problems[0])
+    points = coordinates_of(options.coordinates, read.files.problems[0])
     return RobotInTask(used, executive, run, points)
-
-
-def _require_guarantee(used: TaskLanguage) -> None:
-    """Raise an error for a language that guarantees processes nothing in this task."""
-    if not used.model.is_asynchronous:
-        raise UsageError(
-            "the words are for joint steps, and a process keeps no common step",
-            remedy="Build with --asynchronous.",
-        )
-    if not used.guaranteed:
-        raise Refuted("the language guarantees nothing in this task", remedy="Build one for it.")
 
 
 def _run_of(read: ReadTask, name: str | None) -> str:

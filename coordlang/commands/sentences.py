@@ -14,12 +14,7 @@ from coordlang.commands.inputs import Arguments, InTask, public, wishes_in
 from coordlang.commands.plans import OptimalPlans, PlanSteps, show_listed
 from coordlang.commands.records import PlanOptions, SayOptions, UnderstandOptions
 from coordlang.commands.terminal import covered_code, echo
-from coordlang.execution.best_sentence import (
-    BestSentence,
-    Preference,
-    best_sentence,
-    read_preference,
-)
+from coordlang.execution.best_sentence import Preference, best_sentence, read_preference
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
 from coordlang.execution.plan_sentence import PlanDag, sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
@@ -247,13 +242,15 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
         texts(used.model.in_step, found.plan),
         found,
         plan_under_sentence(used, None, bound, expanded),
-        tuple(_fulfilled(preferences, best)) if best else (),
+        tuple(_fulfilled(preferences, best.values)) if best else (),
         SentencePlans(used, words),
     )
 
 
-def _fulfilled(preferences: Sequence[Preference], best: BestSentence) -> Iterator[Fulfilled]:
-    for preference, value in zip(preferences, best.values, strict=True):
+def _fulfilled(
+    preferences: Sequence[Preference], values: Sequence[int | tuple[int, int]]
+) -> Iterator[Fulfilled]:
+    for preference, value in zip(preferences, values, strict=True):
         if isinstance(value, int):
             yield Fulfilled(str(preference), value)
         else:

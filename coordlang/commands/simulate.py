@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from coordlang.commands.inputs import Arguments, public, read_coordinates_of, wishes_in
+from coordlang.commands.inputs import Arguments, coordinates_of, public, wishes_in
 from coordlang.commands.records import File, SimulateOptions
 from coordlang.commands.terminal import covered_code, echo, ended_early, working
 from coordlang.execution.best_sentence import best_sentence, read_preference
@@ -128,7 +128,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     wished = wishes_in(options.prefer)
     preferred = [text for text in wished if not text.startswith(_VISIT)]
     prepared = _prepared(task.used, options, preferred)
-    points = read_coordinates_of(options.coordinates, task.files.problems[0])
+    points = coordinates_of(options.coordinates, task.files.problems[0])
     floor = Floor(prepared.world, points)
     step, most = _step(task.used, options.step), MOST_RADIUS * floor.shortest
     radius = prepared.radius_on(floor, min(settings.radius, most))

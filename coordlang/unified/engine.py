@@ -17,16 +17,9 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
 
-from unified_planning.engines import (
-    AnytimeGuarantee,
-    Engine,
-    LogLevel,
-    LogMessage,
-    OptimalityGuarantee,
-    PlanGenerationResult,
-    ValidationResult,
-)
+import unified_planning.engines as up
 from unified_planning.engines import FailedValidationReason as Reason
+from unified_planning.engines import LogLevel, LogMessage
 from unified_planning.engines import PlanGenerationResultStatus as Status
 from unified_planning.engines import ValidationResultStatus as Validity
 from unified_planning.engines.mixins import (
@@ -205,7 +198,7 @@ _STATUS: dict[type[Exception], Status] = {
 }
 
 
-class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidatorMixin):  # type: ignore[misc]
+class CoordlangEngine(up.Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidatorMixin):  # type: ignore[misc]
     """Plans of least makespan, in joint steps, for all robots of a problem together.
 
     ``robots``, ``robot_type`` and ``unowned`` say who acts in a problem without agents: objects or
@@ -227,7 +220,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
     """
 
     def __init__(self, **parameters: Any) -> None:
-        Engine.__init__(self)
+        up.Engine.__init__(self)
         OneshotPlannerMixin.__init__(self)
         AnytimePlannerMixin.__init__(self)
         self._options = EngineOptions.of(**parameters)
@@ -253,14 +246,14 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         return plan_kind in PLAN_KINDS
 
     @staticmethod
-    def satisfies(optimality_guarantee: OptimalityGuarantee) -> bool:
+    def satisfies(optimality_guarantee: up.OptimalityGuarantee) -> bool:
         """Every plan is optimal."""
         return True
 
     @staticmethod
-    def ensures(anytime_guarantee: AnytimeGuarantee) -> bool:
+    def ensures(anytime_guarantee: up.AnytimeGuarantee) -> bool:
         """Optimal plans one after another are ensured, improving plans are not."""
-        return bool(anytime_guarantee == AnytimeGuarantee.OPTIMAL_PLANS)
+        return bool(anytime_guarantee == up.AnytimeGuarantee.OPTIMAL_PLANS)
 
     # Planning.
 
@@ -270,13 +263,13 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         heuristic: Any = None,
         timeout: float | None = None,
         output_stream: Any = None,
-    ) -> PlanGenerationResult:
+    ) -> up.PlanGenerationResult:
         first = next(self._get_solutions(problem, timeout))
         return first if first.plan is None else replace(first, status=_done(problem))
 
     def _get_solutions(
         self, problem: Any, timeout: float | None = None, output_stream: Any = None
-    ) -> Iterator[PlanGenerationResult]:
+    ) -> Iterator[up.PlanGenerationResult]:
         """Every plan once: all but the last are `INTERMEDIATE`."""
         end = math.inf if timeout is None else time.monotonic() + timeout
         if timeout is not None and threading.current_thread() is not threading.main_thread():
@@ -297,7 +290,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
 
     def _results(
         self, problem: Any, found: Translated, space: PlanSpace, notes: list[LogMessage], end: float
-    ) -> Iterator[PlanGenerationResult]:
+    ) -> Iterator[up.PlanGenerationResult]:
         """The plans of a space, one by one; no further one from the time ``end`` on."""
         plans, model = Plans.of(space), space.model
         whole = model.is_joint_action or len(model.robots) == 1
@@ -313,7 +306,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 return
             status = _done(problem) if number == plans.count - 1 else Status.INTERMEDIATE
             plan = to_up(found, plans, plans.unrank(number), kind, problem.environment)
-            yield PlanGenerationResult(status, plan, self.name, {**metrics}, [*notes])
+            yield up.PlanGenerationResult(status, plan, self.name, {**metrics}, [*notes])
 
     def _search(self, problem: Any) -> tuple[Translated, PlanSpace, list[LogMessage]]:
         """The optimal plans, under the sentence if one is given."""
@@ -356,13 +349,13 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             self._options.model_options(found),
         )
 
-    def _none(self, status: Status, why: str) -> PlanGenerationResult:
+    def _none(self, status: Status, why: str) -> up.PlanGenerationResult:
         messages = [LogMessage(LogLevel.INFO, why)]
-        return PlanGenerationResult(status, None, self.name, log_messages=messages)
+        return up.PlanGenerationResult(status, None, self.name, log_messages=messages)
 
     # Validation.
 
-    def _validate(self, problem: Any, plan: Any) -> ValidationResult:
+    def _validate(self, problem: Any, plan: Any) -> up.ValidationResult:
         """By the rules of joint steps (`planners.check.rules`).
 
         Under a sentence the plan must be optimal and have it, too.  A metric does not matter.
@@ -392,9 +385,9 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         metrics = {"makespan": str(len(steps))}
         if leaves_steps_open(plan):
             messages.append(_warning(_OPEN))
-        return ValidationResult(Validity.VALID, self.name, messages, metrics=metrics)
+        return up.ValidationResult(Validity.VALID, self.name, messages, metrics=metrics)
 
-    def _refuted(self, verdict: Verdict, steps: Sequence[Any]) -> ValidationResult:
+    def _refuted(self, verdict: Verdict, steps: Sequence[Any]) -> up.ValidationResult:
         """What an invalid plan breaks: the rules in a step of `of_up`, or the goal at the end."""
         assert verdict.step is not None
         if verdict.step == len(steps):
@@ -422,8 +415,8 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             return None
         return f'the sentence of this plan is "{task_language.text(words)}"'
 
-    def _invalid(self, why: str, reason: Reason | None, action: Any = None) -> ValidationResult:
-        return ValidationResult(
+    def _invalid(self, why: str, reason: Reason | None, action: Any = None) -> up.ValidationResult:
+        return up.ValidationResult(
             Validity.INVALID,
             self.name,
             [LogMessage(LogLevel.INFO, why)],

@@ -16,14 +16,8 @@ from itertools import chain, pairwise, product
 from typing import Any
 
 import networkx
+import unified_planning.plans as up
 from unified_planning.engines import FailedValidationReason as Reason
-from unified_planning.plans import (
-    ActionInstance,
-    PartialOrderPlan,
-    PlanKind,
-    SequentialPlan,
-    TimeTriggeredPlan,
-)
 
 from coordlang.unified.translation import Translated
 from planners.joint.model import JointModel
@@ -51,23 +45,23 @@ def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: A
     steps: list[list[Any]] = [[] for _ in plan]
     for number, text in numbered_actions(plans, plan, plans.steps(plan)):
         steps[number].append(_instance(found, text))
-    if kind == PlanKind.SEQUENTIAL_PLAN:
-        return SequentialPlan([*chain(*steps)], environment)
-    if kind == PlanKind.TIME_TRIGGERED_PLAN:
+    if kind == up.PlanKind.SEQUENTIAL_PLAN:
+        return up.SequentialPlan([*chain(*steps)], environment)
+    if kind == up.PlanKind.TIME_TRIGGERED_PLAN:
         timed = [(Fraction(n), action, None) for n, step in enumerate(steps) for action in step]
-        return TimeTriggeredPlan(timed, environment)
+        return up.TimeTriggeredPlan(timed, environment)
     acting = [*filter(None, steps), []]
     followers = {action: after for step, after in pairwise(acting) for action in step}
-    return PartialOrderPlan(followers, environment)
+    return up.PartialOrderPlan(followers, environment)
 
 
-def _instance(found: Translated, text: str) -> ActionInstance:
+def _instance(found: Translated, text: str) -> up.ActionInstance:
     """The action that a PDDL text stands for: what `label` gives for it."""
     schema, *args = text[1:-1].split()
     members = found.schemas[schema]
     agent = None if None in members else args.pop(0)
     objects = tuple(found.objects[arg] for arg in args)
-    return ActionInstance(members[agent], objects, agent and found.agents[agent])
+    return up.ActionInstance(members[agent], objects, agent and found.agents[agent])
 
 
 def of_up(
@@ -95,7 +89,7 @@ def of_up(
 
 def leaves_steps_open(plan: Any) -> bool:
     """Whether the order of a partial-order plan does not say in which steps its actions are."""
-    if not isinstance(plan, PartialOrderPlan):
+    if not isinstance(plan, up.PartialOrderPlan):
         return False
     before = networkx.transitive_closure_dag(networkx.DiGraph(plan.get_adjacency_list))
     pairs = (pair for one, other in pairwise(_steps(plan)) for pair in product(one, other))
@@ -104,16 +98,16 @@ def leaves_steps_open(plan: Any) -> bool:
 
 def _steps(plan: Any) -> Sequence[Sequence[Any]]:
     """The actions of a unified-planning plan, step by step."""
-    if isinstance(plan, SequentialPlan):
+    if isinstance(plan, up.SequentialPlan):
         return [[action] for action in plan.actions]
-    if isinstance(plan, TimeTriggeredPlan):
+    if isinstance(plan, up.TimeTriggeredPlan):
         steps: dict[Any, list[Any]] = defaultdict(list)
         for start, action, duration in plan.timed_actions:
             if duration is not None:
                 raise NoSteps(f"{action} has a duration, and actions here have none", action)
             steps[start].append(action)
         return [steps[start] for start in sorted(steps)]
-    if not isinstance(plan, PartialOrderPlan):
+    if not isinstance(plan, up.PartialOrderPlan):
         raise UsageError(
             f"a {type(plan).__name__} cannot be validated",
             remedy="Plans are partial-order, sequential or time-triggered.",

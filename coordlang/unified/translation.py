@@ -112,7 +112,12 @@ def translate(
     to no action, `BadInput` for a problem without a robot.
     """
     subactions, concurrency = subactions or {}, concurrency or {}
-    _check_problem(problem)
+    if type(problem) not in (Problem, MultiAgentProblem):
+        raise refused(f"a {type(problem).__name__} is not supported")
+    if type(problem) is MultiAgentProblem and not problem.agents:
+        raise BadInput("the problem has no agent", remedy="Add one: problem.add_agent(..).")
+    if others := problem.kind.features - FEATURES - _METRICS:
+        raise refused(f"not supported: {', '.join(sorted(others))}")
     _check_parameters(problem, subactions, concurrency)
     writer = _Writer(problem, concurrency)
     domain_text, problem_text, schemas = writer.write(subactions)
@@ -122,20 +127,10 @@ def translate(
         domain=domain,
         problem=parse_problem(Source(f"unified-planning problem {name!r}", problem_text), domain),
         schemas=schemas,
-        objects={writer.object_name(o): o for o in problem.all_objects},
-        agents={writer.agent_name(a): a for a in writer.agents},
+        objects=writer.objects,
+        agents=writer.named_agents,
         types={t.name: writer.type_name(t) for t in problem.user_types},
     )
-
-
-def _check_problem(problem: Any) -> None:
-    """Raise `Unsupported` for a problem that is not read, `BadInput` for one without an agent."""
-    if type(problem) not in (Problem, MultiAgentProblem):
-        raise refused(f"a {type(problem).__name__} is not supported")
-    if type(problem) is MultiAgentProblem and not problem.agents:
-        raise BadInput("the problem has no agent", remedy="Add one: problem.add_agent(..).")
-    if others := problem.kind.features - FEATURES - _METRICS:
-        raise refused(f"not supported: {', '.join(sorted(others))}")
 
 
 def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurrency) -> None:
@@ -198,7 +193,8 @@ class PddlNames:
 class _Writer:
     """The text, with the names of everything in it.
 
-    ``declared`` are the predicates named so far; ``apart``: some action is not for all agents.
+    ``objects`` and ``named_agents`` are by their names, ``declared`` the predicates named so far;
+    ``apart``: some action is not for all agents.
     """
 
     def __init__(self, problem: Any, concurrency: Concurrency) -> None:
@@ -228,10 +224,8 @@ class _Writer:
         if self.concurrency:  # its formulas name actions, not fluents that are called so
             for action in (a.name for agent in self.agents for a in agent.actions):
                 self.names.of("predicate", ("action", action), action)
-        for o in self.problem.all_objects:
-            self.object_name(o)
-        for agent in self.agents:
-            self.agent_name(agent)
+        self.objects = {self.object_name(o): o for o in self.problem.all_objects}
+        self.named_agents = {self.agent_name(agent): agent for agent in self.agents}
 
     def type_name(self, kind: Any) -> str:
         if not kind.is_user_type():
@@ -282,9 +276,8 @@ class _Writer:
             self.predicate(fluent, None)
         actions, schemas = self.actions(subactions)
         facts, goals = self.facts(), self.goals()  # they may declare further predicates
-        things = [(self.object_name(o), self.type_name(o.type)) for o in self.problem.all_objects]
-        things += [(self.agent_name(agent), self.own_type(agent)) for agent in self.agents]
-        objects = [f"{name} - {kind}" for name, kind in things]
+        objects = [f"{name} - {self.type_name(o.type)}" for name, o in self.objects.items()]
+        objects += [f"{name} - {self.own_type(a)}" for name, a in self.named_agents.items()]
         sections = [
             _section("(:types", self.type_lines()),
             _section("(:constants", objects),  # constants, as actions may name them
@@ -316,7 +309,7 @@ class _Writer:
         groups = self.groups(subactions)
         self.apart = any(len(members) < len(self.agents) for members in groups.values())
         self.require_one_form(key[0] for key in groups)
-        own_types = {self.agent_name(agent): self.own_type(agent) for agent in self.agents}
+        own_types = {name: self.own_type(agent) for name, agent in self.named_agents.items()}
         actions: list[str] = []
         schemas: Schemas = {}
         for key, members in groups.items():
@@ -496,23 +489,17 @@ def _clashes(action: Any) -> Iterator[Any]:
     for one, two in combinations_with_replacement(objects, 2):
         if one.fluent.fluent() != two.fluent.fluent():
             continue
-        others, target, value, when = _renamed(two)
+        others = [Variable(f"{v.name}'", v.type, v.environment) for v in two.forall]
+        given, fresh = map(new.VariableExp, two.forall), map(new.VariableExp, others)
+        renamed = dict(zip(given, fresh, strict=True))
+        parts = (two.fluent, two.value, two.condition)
+        target, value, when = (part.substitute(renamed) for part in parts)
         same = [new.Equals(a, b) for a, b in zip(one.fluent.args, target.args, strict=True)]
         values = new.And(*same, new.Not(new.Equals(one.value, value)))
         if not values.simplify().is_false():
             clash = new.And(one.condition, when, values)
             variables = (*one.forall, *others)
             yield new.Not(new.Exists(clash, *variables) if variables else clash)
-
-
-def _renamed(effect: Any) -> tuple[list[Variable], Any, Any, Any]:
-    """Other variables for those of an effect; and its fluent, value and condition with them."""
-    new = effect.fluent.environment.expression_manager
-    others = [Variable(f"{v.name}'", v.type, v.environment) for v in effect.forall]
-    variables = [*map(new.VariableExp, effect.forall)]
-    renamed = dict(zip(variables, map(new.VariableExp, others), strict=True))
-    parts = (effect.fluent, effect.value, effect.condition)
-    return others, *(part.substitute(renamed) for part in parts)
 
 
 def refused(what: str) -> Unsupported:

@@ -14,7 +14,7 @@ from unittest.mock import Mock
 import pytest
 
 import coordlang as api
-from coordlang.commands.inputs import read_coordinates_of
+from coordlang.commands.inputs import coordinates_of
 from coordlang.commands.lift import Lifted
 from coordlang.language.words import Language
 from coordlang.lifted.language import LiftedLanguage, lifted_from_bytes, to_bytes
@@ -238,7 +238,7 @@ def test_plans_with_the_same_states(tmp_path: Path) -> None:
 def test_coordinates_given_as_objects() -> None:
     """As those of a file: names in any case, and numbers."""
     small = parse_problem(Source("small", SMALL.read_text()), read_domain(GRID))
-    assert read_coordinates_of({"C0-0": (0.0, 1.0)}, small) == {"c0-0": (0.0, 1.0)}
+    assert coordinates_of({"C0-0": (0.0, 1.0)}, small) == {"c0-0": (0.0, 1.0)}
     with pytest.raises(BadInput, match="the coordinates must be between"):
         api.lift(GRID, SMALL, coordinates={"c0-0": (float("nan"), 0.0)}, jobs=1)
 
