@@ -122,8 +122,6 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
                 from coordlang.commands.schema import error_json
 
                 echo(error_json(known))
-                if sys.stdout is not None:
-                    sys.stdout.flush()
         return known.exit_code
 
 

@@ -139,12 +139,7 @@ def _run_of(read: ReadTask, name: str | None) -> str:
 
 def show_robot(found: RobotInTask, options: RobotOptions) -> NoReturn:
     """Act, and print each line at once; then end the process."""
-
-    def write(line: Mapping[str, Any]) -> None:
-        echo(json.dumps(line))
-        sys.stdout.flush()
-
-    found.act(options, write)
+    found.act(options, lambda line: echo(json.dumps(line)))
     # At once: nobody is left to ask for one that is killed while Python tidies up.
     os._exit(0)
 
