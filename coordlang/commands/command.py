@@ -89,7 +89,8 @@ class Command(click.Command):
             title_of |= {each.name: title for each in options_of(kind)}
         title_of |= dict.fromkeys(self.record.used.split(), "Most used")
         for param in self.get_params(ctx):
-            if (row := param.get_help_record(ctx)) is not None:
+            row = param.get_help_record(ctx)
+            if row is not None and isinstance(param, click.Option):
                 sections[title_of.get(param.name or "", "Options")].append(row)
         for title, rows in sections.items():
             if rows:

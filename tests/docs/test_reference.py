@@ -78,6 +78,8 @@ def test_usage_and_options(name: str) -> None:
     assert {cell: listed[cell][: len(expected.get(cell, ""))] for cell in listed} == expected
     usage = " ".join(command(name).collect_usage_pieces(click.Context(command(name))))
     assert f"    coordlang {name} {usage}\n" in section
+    _, _, helped = command(name).get_help(click.Context(command(name))).partition("\nMost used:")
+    assert not re.search(r"(?m)^  [^ -]", helped.partition("  Example:")[0])  # only options
 
 
 def test_every_command_has_its_row() -> None:
