@@ -182,7 +182,7 @@ def repair_language(making: Making, start: Language, seed: int) -> Built:
     words = {s: number[known.states[k]] for s, k in old.keys(job.states) if k in known.states}
     making.progress("verifying the old language")
     partition = known.partition(making.candidates.model)
-    verdict = making.verdict(partition)
+    verdict = verify_candidates(partition, making.candidates, making.workers, making.progress)
     making.note("verify")
     repaired = Repaired(verdict.witness, new_states=len(job.states) - len(words), gone=old.gone)
     if verdict.holds:
@@ -252,14 +252,10 @@ class Making:
             check=self.check,
         )
 
-    def verdict(self, partition: Partition) -> Verdict:
-        """Whether a partition is a coordination language, by definition."""
-        return verify_candidates(partition, self.candidates, self.workers, self.progress)
-
     def check(self, words: Assignment) -> None:
         """Verify what a method found; `AssertionError` if it is no language: it has erred."""
         partition = self.partition_of(words)
-        verdict = self.verdict(partition)
+        verdict = verify_candidates(partition, self.candidates, self.workers, self.progress)
         if not verdict.holds:
             raise AssertionError(
                 f"a method returned what is no coordination language: {verdict.witness}"

@@ -171,14 +171,18 @@ def _names(things: Any) -> tuple[str, ...]:
 
 
 def _read(given: Language | str | None) -> Language | None:
-    """The language, which may be given by the name of its file."""
-    language = given if given is None or isinstance(given, Language) else read_language(given)
-    if language is not None and language.tolerance is not None and language.tolerance.slack:
+    """The language, which may be given by the name of its file, for problems without texts."""
+    if given is None:
+        return None
+    language = given if isinstance(given, Language) else read_language(given)
+    if language.tolerance is not None and language.tolerance.slack:
         raise UsageError(
             "this language is for plans within slack, and this engine gives optimal plans only",
             remedy="Build the language without slack.",
         )
-    return language
+    recorded = language.provenance
+    domain, model = {**recorded.domain, "sha256": None}, {**recorded.model, "world_sha256": None}
+    return replace(language, provenance=replace(recorded, domain=domain, model=model))
 
 
 #: What is said of a plan that is valid step by step, and orders its actions less than that.
@@ -335,19 +339,10 @@ class CoordlangEngine(up.Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanV
         return found, task_language.plans_with(words), messages
 
     def _language_in(self, found: Translated) -> TaskLanguage:
-        """The language in this problem, which has no texts of its own to compare."""
-        language = self._options.language
+        """The language in this problem."""
+        language, options = self._options.language, self._options.model_options(found)
         assert language is not None
-        recorded = language.provenance
-        domain = {**recorded.domain, "sha256": None}
-        model = {**recorded.model, "world_sha256": None}
-        provenance = replace(recorded, domain=domain, model=model)
-        return language_in_task(
-            replace(language, provenance=provenance),
-            found.domain,
-            found.problem,
-            self._options.model_options(found),
-        )
+        return language_in_task(language, found.domain, found.problem, options)
 
     def _none(self, status: Status, why: str) -> up.PlanGenerationResult:
         messages = [LogMessage(LogLevel.INFO, why)]
