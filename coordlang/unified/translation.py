@@ -66,12 +66,12 @@ _OPERATORS = {
     OperatorKind.EXISTS: "exists",
     OperatorKind.FORALL: "forall",
 }
+_QUANTIFIERS = ("exists", "forall")
 #: What an action is given, by the parameter, and an example.
 _EXAMPLES: dict[str, tuple[Any, str]] = {
     "subactions": (Mapping, '{"r1": "(move ?a ?b)"}'),
     "concurrency": (str, '"(forall (?o - agent) (not (take ?o)))"'),
 }
-_QUANTIFIERS = ("exists", "forall")
 #: Kinds of expressions about values, which other ones combine.
 _ATOMIC = (OperatorKind.FLUENT_EXP, OperatorKind.DOT, OperatorKind.EQUALS)
 
