@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from math import inf
 from os import PathLike, fspath
 from typing import Any
 from warnings import catch_warnings, simplefilter
@@ -20,7 +19,7 @@ from coordlang.language.recorded import check_source, recorded_candidates
 from coordlang.language.words import Partition
 from coordlang.required.failure import NONE, Failures, TooManyToCount, failures_under
 from coordlang.verification.by_definition import Verdict, verify_candidates
-from coordlang.verification.certificate_file import Certificate, read_certificate
+from coordlang.verification.certificate_file import read_certificate
 from coordlang.verification.check_certificate import Checked
 from coordlang.verification.check_certificate import check as check_certificate
 from planners.loading import PlanningInstance
@@ -172,8 +171,7 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
         else:
             candidates = files.candidates(tasks, model)
         require_solvable(candidates)
-        if "robots" not in files.source.given:
-            _note_other_robots(candidates.loaded)
+        _note_other_robots(candidates.loaded, files.source.given)
         partition = read.partition(candidates.model)
         note_size(candidates)
         verdict = verify_candidates(partition, candidates, workers, say)
@@ -182,7 +180,12 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
     words, claimed, robots = len(read.words), read.guarantee.lower_bound, candidates.model.robots
     checked = None
     if proof and (verdict.holds or claims):
-        checked = _checked(proof, candidates, words if verdict.holds else inf)
+        checked = check_certificate(proof, candidates, say)
+        if verdict.holds and checked.lower_bound > words:
+            raise AssertionError(
+                f"a language of {words} words is verified, and a certificate that "
+                f"{checked.lower_bound} are needed: one of the two is wrong"
+            )
     more = (words, claimed, checked, robots, model, found, read.tolerance, str(position))
     return extended(Verification, verdict, *more)
 
@@ -199,19 +202,10 @@ def _failures(partition: Partition, candidates: Candidates, *, is_claimed: bool)
     return found
 
 
-def _checked(proof: Certificate, candidates: Candidates, most: float) -> Checked:
-    """What a certificate proves; `AssertionError` if that is more than the words of a language."""
-    checked = check_certificate(proof, candidates, say)
-    if checked.lower_bound > most:
-        raise AssertionError(
-            f"a language of {most} words is verified, and a certificate that "
-            f"{checked.lower_bound} are needed: one of the two is wrong"
-        )
-    return checked
-
-
-def _note_other_robots(loaded: PlanningInstance) -> None:
+def _note_other_robots(loaded: PlanningInstance, given: Collection[str]) -> None:
     """Write a note where the robots of a language file are not those that are found without it."""
+    if "robots" in given:
+        return
     try:
         with catch_warnings():
             simplefilter("ignore", Note)
