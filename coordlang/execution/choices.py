@@ -8,11 +8,11 @@ no more and no fewer.  Choices files have them as JSON (docs/formats.md), which
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import reduce
-from operator import or_
+from operator import and_
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -25,8 +25,9 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
 from planners.joint.model import JointModel
-from planners.joint.traces import Traces
-from planners.pddl.lifted import TRUE
+from planners.joint.states import bits
+from planners.joint.traces import Event, Traces
+from planners.search.goals import FactsOf
 from planners.search.plan_file import Count, json_count
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
@@ -138,31 +139,25 @@ def own_changes(model: JointModel, robot: int) -> tuple[int, dict[str | None, tu
     changes the fact, no conditional effect does, and two (joint) actions with the same own part
     change it in the same way.
     """
-    others = {*model.slack_facts}  # they change by themselves
-    of_part: dict[str | None, dict[int, bool]] = {}
+    unsure = {*model.slack_facts}  # they change by themselves
+    of_part: dict[str | None, FactsOf] = {}
     for action in model.actions:
-        certain: dict[int, bool] = {}
-        for effect in action.effects:
-            fact = model.codec.facts.index.get(effect.atom)
-            if fact is None:
-                continue
-            if effect.condition != TRUE or robot not in action.owners:
-                others.add(fact)
-            elif effect.adds or fact not in certain:  # of an atom deleted and added, the latter
-                certain[fact] = effect.adds
+        facts = FactsOf.of(model, action)
+        unsure |= {fact for _, fact, _ in facts.conditional}
         if robot in action.owners:
-            first = of_part.setdefault(action.part_of(robot), certain)
-            others |= {f for f in first.keys() | certain.keys() if first.get(f) != certain.get(f)}
-    if model.is_asynchronous:  # that others do something while it idles is no event of it
-        others |= of_part.pop(None, {}).keys()
-    facts = sum(1 << fact for fact in range(len(model.codec.facts)) if fact not in others)
+            first = of_part.setdefault(action.part_of(robot), facts)
+            unsure |= (first.adds ^ facts.adds) | (first.deletes ^ facts.deletes)
+        else:
+            unsure |= facts.adds | facts.deletes
+    if model.is_asynchronous and None in of_part:
+        idling = of_part.pop(None)  # that others do something meanwhile is no event of it
+        unsure |= idling.adds | idling.deletes
 
-    def changed(certain: Mapping[int, bool], adds: bool) -> int:
-        return facts & sum(1 << fact for fact, added in certain.items() if added is adds)
+    def sure(facts: Iterable[int]) -> int:
+        return sum(1 << fact for fact in {*facts} - unsure)
 
-    return facts, {
-        part: (changed(certain, True), changed(certain, False)) for part, certain in of_part.items()
-    }
+    changes = {part: (sure(facts.adds), sure(facts.deletes)) for part, facts in of_part.items()}
+    return sure(range(len(model.codec.facts))), changes
 
 
 # ---- the file
@@ -290,14 +285,9 @@ def monitor(fits: PlanSpace, own: RobotChoices, sentence: str) -> Monitor:
 
 def _robot(fits: PlanSpace, own: RobotChoices) -> RobotRecord:
     model, automaton = fits.model, own.automaton
-    labels, texts = model.labels[own.robot], model.codec.facts.texts
-    sometimes_known = reduce(or_, (known.true | ~known.possible for known in automaton.known))
-    facts = [fact for fact in range(len(texts)) if sometimes_known >> fact & 1]
-    others = sorted({*range(len(texts))} - {*facts})
-
-    def numbers(bits: int) -> list[int]:
-        return [number for number, fact in enumerate(facts) if bits >> fact & 1]
-
+    texts = model.codec.facts.texts
+    others = [*bits(reduce(and_, (known.unknown for known in automaton.known)))]
+    facts = sorted({*range(len(texts))} - {*others})
     return RobotRecord(
         robot=model.robots[own.robot],
         steps=automaton.steps,
@@ -305,71 +295,92 @@ def _robot(fits: PlanSpace, own: RobotChoices) -> RobotRecord:
         atoms=own.atoms,
         facts=[texts[fact] for fact in facts],
         others=[texts[fact] for fact in others],
-        states=[
-            StateRecord(
-                step=step,
-                left=json_count(automaton.left[state]),
-                next={labels[label]: to for label, to in automaton.moves[state].items()},
-                true=numbers(automaton.known[state].true),
-                unknown=numbers(automaton.known[state].unknown),
-            )
-            for step, states in enumerate(automaton.layers)
-            for state in states
-        ],
+        states=_states(automaton, model.labels[own.robot], facts),
         passings=_passings(fits, own) if model.is_asynchronous else UNSET,
     )
+
+
+def _states(automaton: Automaton, labels: Sequence[str], facts: Sequence[int]) -> list[StateRecord]:
+    def numbers(known: int) -> list[int]:
+        return [number for number, fact in enumerate(facts) if known >> fact & 1]
+
+    return [
+        StateRecord(
+            step=step,
+            left=json_count(automaton.left[state]),
+            next={labels[label]: to for label, to in automaton.moves[state].items()},
+            true=numbers(automaton.known[state].true),
+            unknown=numbers(automaton.known[state].unknown),
+        )
+        for step, states in enumerate(automaton.layers)
+        for state in states
+    ]
 
 
 def _passings(fits: PlanSpace, own: RobotChoices) -> Passings:
     """What a robot waits for in its subplans, and what it may hear of the others."""
     model, robot = fits.model, own.robot
-    robots, texts = model.robots, model.in_step.labels
-    others = [other for other in range(len(robots)) if other != robot]
-    may_be = {other: _events_of(fits, other, robot) for other in others}
-    interfering = Traces(model.in_step).interfering
+    may_be = {
+        name: _events_of(fits, other, robot)
+        for other, name in enumerate(model.robots)
+        if other != robot
+    }
     events = {
         model.labels[robot][label]: event
         for label in sorted(own.automaton.labels)
         if (event := model.events[robot][label])
     }
-
-    def interferes(label: int, other: int) -> list[str]:
-        its_labels = sorted({its for event in may_be[other] for its in event})
-        return [texts[other][its] for its in its_labels if interfering[robot, other][label, its]]
-
+    labels = sorted({event.label for event in events.values()})
     return Passings(
-        events={
-            text: OwnEvent(
-                texts[robot][event.label],
-                {robots[other]: event.waits[other] for other in others if event.waits[other]},
-                {robots[other]: texts[other][its] for other, its in event.meets},
-            )
-            for text, event in events.items()
-        },
-        interferes={
-            texts[robot][label]: {robots[other]: interferes(label, other) for other in others}
-            for label in sorted({event.label for event in events.values()})
-        },
-        others={
-            robots[other]: [
-                {texts[other][its]: least for its, least in one.items()} for one in its_events
-            ]
-            for other, its_events in may_be.items()
-        },
+        events={text: _own_event(model, robot, event) for text, event in events.items()},
+        interferes=_interferes(model.in_step, robot, labels, may_be),
+        others=may_be,
     )
 
 
-def _events_of(fits: PlanSpace, robot: int, waiting_for: int) -> list[dict[int, int]]:
-    """What a robot's first event may be, its second one and so on, by its label in step.
+def _own_event(model: JointModel, robot: int, event: Event) -> OwnEvent:
+    robots, texts = model.robots, model.in_step.labels
+    return OwnEvent(
+        texts[robot][event.label],
+        {name: number for name, number in zip(robots, event.waits, strict=True) if number},
+        {robots[other]: texts[other][its] for other, its in event.meets},
+    )
+
+
+def _interferes(
+    model: JointModel, robot: int, labels: Iterable[int], may_be: Mapping[str, _Events]
+) -> dict[str, dict[str, list[str]]]:
+    """For each own subaction those that others may do and that interfere with it."""
+    interfering = Traces(model).interfering
+    heard = {model.robots.index(name): set().union(*its) for name, its in may_be.items()}
+    return {
+        model.labels[robot][label]: {
+            model.robots[other]: [
+                text
+                for its, text in enumerate(model.labels[other])
+                if text in texts and interfering[robot, other][label, its]
+            ]
+            for other, texts in heard.items()
+        }
+        for label in labels
+    }
+
+
+#: What each event of a robot may be -> the least number of events that it waits for.
+_Events = list[dict[str, int]]
+
+
+def _events_of(fits: PlanSpace, robot: int, waiting_for: int) -> _Events:
+    """What a robot's first event may be, its second one and so on.
 
     With the least number of events of another robot that it waits for.
     """
-    found: list[dict[int, int]] = []
+    texts = fits.model.in_step.labels[robot]
+    found: _Events = []
     for numbers in fits.labels_by_step(robot):
         waits: dict[int, int] = {}
-        for event in (fits.model.events[robot][number] for number in numbers):
-            if event is not None:
-                least = waits.get(event.label, event.waits[waiting_for])
-                waits[event.label] = min(least, event.waits[waiting_for])
-        found.append(dict(sorted(waits.items())))
+        for event in filter(None, (fits.model.events[robot][number] for number in numbers)):
+            least = waits.get(event.label, event.waits[waiting_for])
+            waits[event.label] = min(least, event.waits[waiting_for])
+        found.append({texts[label]: least for label, least in sorted(waits.items())})
     return found

@@ -26,6 +26,7 @@ from coordlang.execution.fleet_log import (
     Agreement,
     Contradiction,
     Event,
+    LogPart,
     Message,
     RobotLog,
     Version,
@@ -130,8 +131,7 @@ class Executive:
             self._heard_at.setdefault(name, now)  # from the first tick on
             if name not in self._silent and now - self._heard_at[name] >= self._silent_after:
                 self._silent.add(name)
-                if not self._logs[name].version.is_done:
-                    self.lines.append({"silent": name, "time": now})
+                self._tell_of("silent", name, now)
         if 0 < self.holds_until <= now:
             self.holds_until = 0.0
         self._advance(now)
@@ -210,24 +210,33 @@ class Executive:
         if self._monitor is None and former > self.life:  # the clock has gone back since
             self.life = former + 1
         for of, part in message.logs.items():
-            if of == self.robot and self._monitor and self._own.version.lacks(part.version):
-                raise Contradiction(f"{name} knows of more than {self.robot} has done")
-            was_done = self._logs[of].version.is_done
-            if self._logs[of].join(part):
-                # All must know that all know who is done, before they leave.
-                is_news = self._logs[of].version.is_done and not was_done
-                self._to_tell |= {*self.others} if is_news else {name}
+            self._join(name, of, part)
         is_new = self._last[name].life != message.life
         self._last[name], self._heard_at[name] = message, now
         if name in self._silent:
             self._silent.discard(name)
-            if not self._logs[name].version.is_done:
-                self.lines.append({"heard": name, "time": now})
+            self._tell_of("heard", name, now)
         if message.late is not None:
             waits = self._monitor is not None and name in self._monitor.late()
             self.lines.append({"late": name, "seconds": message.late, "waiting": waits})
         if is_new or not self._has_heard_us(name) or self._lacks_any(name):
             self._to_tell.add(name)
+
+    def _join(self, by: str, of: str, part: LogPart) -> None:
+        """Take in a part of a log that another robot tells of."""
+        log = self._logs[of]
+        if log is self._own and self._monitor and log.version.lacks(part.version):
+            raise Contradiction(f"{by} knows of more than {self.robot} has done")
+        was_done = log.version.is_done
+        if log.join(part):
+            # All must know that all know who is done, before they leave.
+            is_news = log.version.is_done and not was_done
+            self._to_tell |= {*self.others} if is_news else {by}
+
+    def _tell_of(self, what: str, name: str, now: float) -> None:
+        """Tell the driver that a robot which is not done is silent, or was heard again."""
+        if not self._logs[name].version.is_done:
+            self.lines.append({what: name, "time": now})
 
     def _has_heard_us(self, name: str) -> bool:
         return self._last[name].lives.get(self.robot) == self.life
@@ -295,15 +304,22 @@ class Executive:
     def _advance(self, now: float) -> None:
         if self._agreement.advance():
             self._to_tell |= {*self.others}
-        if self._monitor is None:
-            if not self._has_joined or self._agreement.sentence is None:
-                return
-            self._monitor = self._checked(self._monitor_of(self._agreement.sentence))
-            self.lines.append({"sentence": self._agreement.sentence, "time": now})
-            if self.underway is not None:  # before a restart; its end may be lost
-                number, subaction = self.underway
-                self.lines.append({"event": number, "underway": subaction, "time": now})
-        monitor = self._monitor
+        sentence = self._agreement.sentence
+        if self._monitor is None and sentence is not None and self._has_joined:
+            self._join_in(sentence, now)
+        if self._monitor is not None:
+            self._act(self._monitor, now)
+
+    def _join_in(self, sentence: str, now: float) -> None:
+        """Begin, or go on after a restart, with the choices under a sentence."""
+        self._monitor = self._checked(self._monitor_of(sentence))
+        self.lines.append({"sentence": sentence, "time": now})
+        if self.underway is not None:  # before a restart; its end may be lost
+            number, subaction = self.underway
+            self.lines.append({"event": number, "underway": subaction, "time": now})
+
+    def _act(self, monitor: EventMonitor, now: float) -> None:
+        """Do all that can be done now."""
         while (
             self._heeds_wishes(monitor)
             or self._counts(monitor)

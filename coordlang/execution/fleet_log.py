@@ -178,7 +178,7 @@ class Agreement:
         self._best, self._grants = best, grants
         self._proposal: str | None = None
         self._answer: Reply | None = None
-        self._heard: dict[str, Message | None] = dict.fromkeys(others)
+        self._heard: dict[str, Message] = {}
 
     def check(self, message: Message) -> None:
         """Raise `Refuted` if another robot follows another sentence."""
@@ -193,30 +193,39 @@ class Agreement:
     def advance(self) -> bool:
         """Propose, answer or agree, if it can be done now; whether anything was."""
         before = self.said()
-        heard = [message for message in self._heard.values() if message is not None]
-        agreed = [message.sentence for message in heard if message.sentence is not None]
-        if self.sentence is None and agreed:
-            self.sentence = agreed[0]
-        elif self.sentence is None and len(heard) == len(self._heard):
-            self._talk({message.by: message for message in heard})
+        if self.sentence is None:
+            told = (message.sentence for message in self._heard.values())
+            self.sentence = next(filter(None, told), None)
+        if self.sentence is None and len(self._heard) == len(self.others):
+            self._talk()
         return self.said() != before
 
-    def _talk(self, heard: dict[str, Message]) -> None:
-        speakers = [name for name in heard if heard[name].speaks]
-        speakers += [self.robot] * bool(self._wishes)
-        proposer = min(speakers or [self.robot, *heard])
-        if proposer != self.robot:
-            proposed = heard[proposer].proposes
-            if proposed is not None and (not self._answer or self._answer.sentence != proposed):
-                is_granted = self._grants(proposed, self._wishes)
-                self._answer = Reply(proposed, () if is_granted else self._wishes)
-            return
+    def _talk(self) -> None:
+        speakers = [name for name, message in self._heard.items() if message.speaks]
+        if self._wishes:
+            speakers.append(self.robot)
+        proposer = min(speakers or [self.robot, *self.others])
+        if proposer == self.robot:
+            self._propose()
+        else:
+            self._reply(self._heard[proposer].proposes)
+
+    def _propose(self) -> None:
+        """Propose the best sentence, and agree on one when all have answered."""
         if self._proposal is None:
             self._proposal = self._best(self._wishes)
-        answers = [heard[name].answer for name in sorted(heard)]
-        if all(answer and answer.sentence == self._proposal for answer in answers):
-            further = [wish for answer in answers if answer for wish in answer.wishes]
+        answers = [self._heard[name].answer for name in sorted(self.others)]
+        given = [reply for reply in answers if reply and reply.sentence == self._proposal]
+        if len(given) == len(self.others):
+            further = [wish for reply in given for wish in reply.wishes]
             self.sentence = self._best([*self._wishes, *further]) if further else self._proposal
+
+    def _reply(self, proposed: str | None) -> None:
+        """Accept what was proposed, or answer with own wishes, once."""
+        answered = self._answer.sentence if self._answer else None
+        if proposed is not None and proposed != answered:
+            is_granted = self._grants(proposed, self._wishes)
+            self._answer = Reply(proposed, () if is_granted else self._wishes)
 
     def said(self) -> dict[str, Any]:
         """What a message of this robot says of it."""

@@ -17,7 +17,7 @@ import json
 import re
 import zlib
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fnmatch import fnmatchcase
@@ -44,6 +44,9 @@ _AROUND_PARENTHESES = re.compile(r"\s*([()])\s*")
 _PDDL_TEXT = re.compile(r"\([^()]+\)")
 _KINDS = {str: "a text", int: "a whole number", list: "a list", dict: "an object"}
 _Kind = TypeVar("_Kind")
+
+#: In place of what is made of a detour: something that it excludes.
+_EXCLUDED = 1
 
 #: One text or several; None is idling.
 Texts = str | Iterable[str | None] | None
@@ -142,18 +145,22 @@ class Monitor:
         self._atoms = {**dict.fromkeys(facts, False), **dict.fromkeys(sorted(others))}
         if len(self._atoms) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
-        #: What events are, where there are no steps.
-        self._events: dict[str, _OwnEvent] = {}
-        #: What the file says that the robot may do, as it is written there.
-        self._written = self._own_texts(entry, where)
-        self._states = _read_states(entry, facts, where, self._written)
+        #: What the file says that the robot may do, as it is written there -> the subaction.
+        self._written = {IDLE: IDLE}
+        self._read_passings(entry, where)
+        self._states = _read_states(entry, facts, where, self._check_own)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(self._states))
         self._here = self._states[0]
         self._has_promised = False
 
-    def _own_texts(self, entry: Mapping[str, Any], where: str) -> set[str]:
-        """Keys of 'next' that are known to be well written; of events, after reading them."""
-        return {IDLE}
+    def _read_passings(self, entry: Mapping[str, Any], where: str) -> None:
+        """Read what events are, where there are no steps."""
+
+    def _check_own(self, text: str, number: int) -> None:
+        """Raise unless a robot can do what a key of 'next' says in a state with this number."""
+        if text not in self._written:
+            _check_plain(text, f"state {number}: 'next'")
+            self._written[text] = text
 
     @classmethod
     def read(cls, path: str, robot: str | None = None, *, max_bytes: int = MAX_BYTES) -> Self:
@@ -267,47 +274,41 @@ class Monitor:
         """The subplans from here on that make a detour and keep the promises; nothing if none do.
 
         Its states are pairs: one that was open, and the parts of the detour that are made by then
-        (bits: the visits, then the dos).  The present comes first.
+        (bits: `_EXCLUDED`, the visits, then the dos).  The present comes first.
         """
         visit, avoid, do, never = map(_texts, detour)
         for atom in (*visit, *avoid):
             self._check_atom(atom)
         made_in = cache(partial(self._made_in, visit, avoid))
-        made_by = cache(partial(_made_by, do, never, len(visit)))
-        made = made_in(self._here)
-        if made is None:
-            return []
-        pairs, found = [(self._here, made)], [_State(self._here.step, self._here.known)]
-        number: dict[tuple[int, int], int] = {}
-        for (state, before), new in zip(pairs, found, strict=True):  # which grow meanwhile
+        made_by = cache(partial(_made_by, do, never, 1 + len(visit)))
+        whole = (1 << 1 + len(visit) + len(do)) - 1 - _EXCLUDED
+        pairs, found = [(self._here, made_in(self._here))], list[_State]()
+        number = {pairs[0]: 0}
+        for state, before in pairs:  # which grow meanwhile
+            is_way = not state.moves and before == whole
+            found.append(_State(state.step, state.known, left=int(is_way)))
             for text, to in state.moves.items():
                 there = self._states[to]
-                event = self._events.get(text) if text else None
-                now, then = made_by(event.subaction if event else text), made_in(there)
-                if now is None or then is None:
+                made = before | made_by(self._written[text or IDLE]) | made_in(there)
+                if made & _EXCLUDED:
                     continue
-                made = before | now | then
-                new.moves[text] = number.setdefault((to, made), len(found))
-                if new.moves[text] == len(found):
+                if (there, made) not in number:
+                    number[there, made] = len(pairs)
                     pairs.append((there, made))
-                    found.append(_State(there.step, there.known))
-            if len(found) > self._most:
+                found[-1].moves[text] = number[there, made]
+            if len(pairs) > self._most:
                 raise MonitorError(
                     f"{len(visit) + len(do)} visits and dos at once are too many here: there are "
                     f"more than {self._most:,} ways to have made some of them; ask for fewer"
                 )
-        whole = (1 << len(visit) + len(do)) - 1
-        for (state, made), new in zip(reversed(pairs), reversed(found), strict=True):
-            new.moves = {text: to for text, to in new.moves.items() if found[to].left}
-            new.left = sum(found[to].left for to in new.moves.values())
-            new.left += not state.moves and made == whole
+        _keep_ways(found)
         return found if found[0].left else []
 
-    def _made_in(self, visit: Sequence[str], avoid: Sequence[str], state: _State) -> int | None:
-        """The visits made in a state, as bits; None if it is to be avoided."""
+    def _made_in(self, visit: Sequence[str], avoid: Sequence[str], state: _State) -> int:
+        """The visits made in a state, as bits from 1 on; `_EXCLUDED` if it is to be avoided."""
         if any(self._value(state, atom) is not False for atom in avoid):
-            return None
-        return sum(1 << bit for bit, atom in enumerate(visit) if self._value(state, atom))
+            return _EXCLUDED
+        return sum(1 << bit for bit, atom in enumerate(visit, 1) if self._value(state, atom))
 
     def _value(self, state: _State, atom: str) -> bool | None:
         return state.known.get(atom, self._atoms[atom])
@@ -357,29 +358,21 @@ class EventMonitor(Monitor):
         self._ready: dict[str, str] = {}
         self._underway: str | None = None
 
-    def _own_texts(self, entry: Mapping[str, Any], where: str) -> set[str]:
+    def _read_passings(self, entry: Mapping[str, Any], where: str) -> None:
         record = _get(entry, "passings", dict, where)
+        self._others = _others(record, where)
         self._events = {
-            text: _own_event(event, f"event {_shown(text)}")
+            text: _own_event(event, self._others, f"event {_shown(text)}")
             for text, event in _get(record, "events", dict, where).items()
         }
-        self._others = _others(record, where)
-        for text, event in self._events.items():
-            if lost := (event.after.keys() | event.meets.keys()) - self._others.keys():
-                raise _broken(f"event {_shown(text)} waits for {_shown(min(lost))}: no such robot")
+        events = {text: event.subaction for text, event in self._events.items()}
+        self._written = events | self._written
         #: Own subaction -> other robot -> its subactions that interfere with it.
-        self._interferes: dict[str, dict[str, list[str]]] = _get(record, "interferes", dict, where)
-        inside = f"{where}: 'interferes'"
-        for own in self._interferes:
-            by_robot = _get(self._interferes, own, dict, inside)
-            for robot in by_robot:
-                for text in _get(by_robot, robot, list, inside):
-                    _check_plain(text, inside)
-        for number, state in enumerate(_get(entry, "states", list, where)):
-            for text in _get(state, "next", dict, f"state {number}"):
-                if text != IDLE and text not in self._events:
-                    raise _broken(f"state {number}: 'events' lacks {_shown(text)}")
-        return {IDLE, *self._events}
+        self._interferes = _interferes(record, where)
+
+    def _check_own(self, text: str, number: int) -> None:
+        if text not in self._written:
+            raise _broken(f"state {number}: 'events' lacks {_shown(text)}")
 
     @property
     def finished(self) -> bool:
@@ -454,9 +447,7 @@ class EventMonitor(Monitor):
         known = {a: v if v is self._value(to, a) else None for a, v in values.items()}
         self._here = _State(here.step, known, {text: here.moves[text]}, to.left)
         self._underway = text
-        partners = self._events[text].meets
-        # They were ready for this meeting, not for the next one.
-        self._ready = {name: its for name, its in self._ready.items() if name not in partners}
+        self._forget_ready(self._events[text].meets)  # not for the next meeting
 
     def did(self, subaction: str | None) -> None:
         """Tell that the event under way has ended; None: the robot does no more.
@@ -495,13 +486,16 @@ class EventMonitor(Monitor):
         if may_be[number - 1][text] > sum(self._ended.get(("", own), 0) for own in waits_for):
             raise NotPossible(f"{what}: it waits for {self.robot}")
         self._observed = {**self._observed, robot: number}
-        self._ready = {name: its for name, its in self._ready.items() if name != robot}
+        self._forget_ready([robot])
         self._count(robot, text)
 
     def ready(self, robot: str, subaction: str) -> None:
         """Tell that another robot is ready to start this together with an own event."""
         self._events_of(robot)
         self._ready = {**self._ready, robot: _plain(subaction)}
+
+    def _forget_ready(self, robots: Iterable[str]) -> None:
+        self._ready = {name: its for name, its in self._ready.items() if name not in robots}
 
     def _event(self, event: str) -> _OwnEvent:
         if event not in self._events:
@@ -524,7 +518,7 @@ def drawn(monitor: Monitor, random: Random, allowed: Sequence[str | None]) -> st
     return allowed[bisect_right([*accumulate(left)], random.randrange(sum(left)))]
 
 
-def _own_event(record: Any, where: str) -> _OwnEvent:
+def _own_event(record: Any, others: Mapping[str, Any], where: str) -> _OwnEvent:
     after, meets = _get(record, "after", dict, where), _get(record, "with", dict, where)
     for robot in after:
         _get(after, robot, int, f"{where}: 'after'")
@@ -532,7 +526,21 @@ def _own_event(record: Any, where: str) -> _OwnEvent:
         _check_plain(meets[robot], f"{where}: 'with'")
     subaction = _text(record, "subaction", where)
     _check_plain(subaction, where)
+    if lost := (after.keys() | meets.keys()) - others.keys():
+        raise _broken(f"{where} waits for {_shown(min(lost))}: no such robot")
     return _OwnEvent(subaction, after, meets)
+
+
+def _interferes(record: Mapping[str, Any], where: str) -> dict[str, dict[str, list[str]]]:
+    """For each own subaction the subactions of other robots that interfere with it."""
+    found: dict[str, dict[str, list[str]]] = _get(record, "interferes", dict, where)
+    inside = f"{where}: 'interferes'"
+    for own in found:
+        by_robot = _get(found, own, dict, inside)
+        for robot in by_robot:
+            for text in _get(by_robot, robot, list, inside):
+                _check_plain(text, inside)
+    return found
 
 
 def _others(record: Mapping[str, Any], where: str) -> dict[str, list[dict[str, int]]]:
@@ -548,11 +556,18 @@ def _others(record: Mapping[str, Any], where: str) -> dict[str, list[dict[str, i
     return others
 
 
-def _made_by(do: Sequence[str], never: Sequence[str], shift: int, text: str | None) -> int | None:
-    """The dos that a subaction makes, as bits from ``shift`` on; None if it is never done."""
+def _made_by(do: Sequence[str], never: Sequence[str], first: int, text: str) -> int:
+    """The dos that a subaction makes, as bits from ``first`` on; `_EXCLUDED` if it is forbidden."""
     if any(_matches(pattern, text) for pattern in never):
-        return None
-    return sum(1 << bit for bit, pattern in enumerate(do, shift) if _matches(pattern, text))
+        return _EXCLUDED
+    return sum(1 << bit for bit, pattern in enumerate(do, first) if _matches(pattern, text))
+
+
+def _keep_ways(states: Sequence[_State]) -> None:
+    """Leave out the moves that lead to no end, and count the subplans; ends have one each."""
+    for state in reversed(states):
+        state.moves = {text: to for text, to in state.moves.items() if states[to].left}
+        state.left += sum(states[to].left for to in state.moves.values())
 
 
 def _head(atom: str) -> str:
@@ -655,47 +670,55 @@ def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
 
 
 def _read_states(
-    entry: Mapping[str, Any], facts: Sequence[str], where: str, texts: set[str]
+    entry: Mapping[str, Any], facts: Sequence[str], where: str, check: Callable[[str, int], None]
 ) -> list[_State]:
     """The states of a file, read backwards; 0 is the start.
 
-    ``texts`` are known to be well written.  Raises `MonitorError` unless every state can be reached
-    from state 0 in step 0 and leads to later states of the next step, so that there are no cycles,
-    all subplans have one length, and the counts of subplans agree: these never take much more
-    memory than those in the file.
+    ``check`` looks at what 'next' says in a state.  Raises `MonitorError` unless every state can be
+    reached from state 0 in step 0 and leads to later states of the next step, so that there are no
+    cycles, all subplans have one length, and the counts of subplans agree: these never take much
+    more memory than those in the file.
     """
     records = _get(entry, "states", list, where)
     steps = [_get(record, "step", int, f"state {n}") for n, record in enumerate(records)]
     if not records or steps[0] != 0:
         raise MonitorError("the automaton has no state 0 in step 0")
     states: dict[int, _State] = {}
-    reached, last = set[int](), max(steps)
-    for number, record in zip(reversed(range(len(records))), reversed(records), strict=True):
-        moves = _moves(record, number, steps[number] + 1, states, texts)
+    reached, last = {0}, max(steps)
+    for number in reversed(range(len(records))):
+        record, step = records[number], steps[number]
+        moves = _moves(record, number, step + 1, states, check)
         reached.update(moves.values())
-        if not moves and steps[number] != last:
-            raise MonitorError(f"state {number} ends after {steps[number]} of {last} steps")
+        if not moves and step != last:
+            raise MonitorError(f"state {number} ends after {step} of {last} steps")
         left = sum(states[to].left for to in moves.values()) or 1
         _check_count(record, "left", left, f"state {number}")
-        states[number] = _State(steps[number], _known(record, facts, number), moves, left)
-    if lost := states.keys() - reached - {0}:
+        states[number] = _State(step, _known(record, facts, number), moves, left)
+    if lost := states.keys() - reached:
         raise MonitorError(f"state {min(lost)} cannot be reached from state 0")
-    if "steps" in entry and _get(entry, "steps", int, "a robot's choices") != last:
-        raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {last}")
-    if "subplans" in entry:
-        _check_count(entry, "subplans", states[0].left, "a robot's choices")
+    _check_whole(entry, last, states[0].left)
     return [*reversed(states.values())]
 
 
+def _check_whole(entry: Mapping[str, Any], steps: int, subplans: int) -> None:
+    """Raise if a robot's choices say that they have other numbers of steps or subplans."""
+    if "steps" in entry and _get(entry, "steps", int, "a robot's choices") != steps:
+        raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {steps}")
+    if "subplans" in entry:
+        _check_count(entry, "subplans", subplans, "a robot's choices")
+
+
 def _moves(
-    record: Any, number: int, step: int, states: Mapping[int, _State], texts: set[str]
+    record: Any,
+    number: int,
+    step: int,
+    states: Mapping[int, _State],
+    check: Callable[[str, int], None],
 ) -> dict[str | None, int]:
-    """What the robot may do in a state, idling first; ``texts`` are known to be well written."""
+    """What the robot may do in a state, idling first."""
     moves: dict[str | None, int] = {}
     for text, to in _get(record, "next", dict, f"state {number}").items():
-        if text not in texts:
-            _check_plain(text, f"state {number}: 'next'")
-            texts.add(text)
+        check(text, number)
         if not _is_number(to) or to not in states or states[to].step != step:
             raise MonitorError(f"state {number} does not lead to a state of step {step}")
         moves[None if text == IDLE else text] = to
@@ -750,10 +773,8 @@ def _plain_or_none(text: str) -> str | None:
     return plain if plain == IDLE or _PDDL_TEXT.fullmatch(plain) else None
 
 
-def _matches(pattern: str, text: str | None) -> bool:
+def _matches(pattern: str, text: str) -> bool:
     """Whether a text is the pattern, in which every * stands for any text."""
-    if pattern == IDLE or text is None:
-        return pattern == IDLE and text is None
     return fnmatchcase(text, re.sub(r"[?[]", r"[\g<0>]", pattern))
 
 
