@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 
@@ -22,8 +22,12 @@ from planners.search.slack import rests
 
 #: (joint steps, second component of the cost).
 Cost = tuple[int, int]
-#: A state's number, and the index in the sentence of its word.
-Node = tuple[int, int]
+#: A state's number, the index in the sentence of its word, and the cost at which it was met.
+Node = tuple[int, int, Cost]
+#: The number of a joint step out of a state, the node that it leads to, and its labels.
+Step = tuple[int, Node, tuple[int, ...]]
+#: How a node was met: from which one, and by which labels.
+Ways = dict[Node, tuple[Node, tuple[int, ...]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,11 +148,12 @@ def _a_star(
 ) -> GuidedPlan:
     """Search for an optimal plan with a sentence that some optimal plan has.
 
-    A node is a state and the *index* of its word in the sentence (0 without a sentence).  What does
-    not fit is pruned: a step stays in its word or goes on to the next one, and a goal state counts
-    at the last word.  A state counts only at the least cost at which it was met: an optimal plan is
-    at none of its states later than it could be.  A word takes at least one step, so with
-    ``count_words`` the number of words that are left is a lower bound, too (the paper only prunes).
+    A node is a state, the *index* of its word in the sentence (0 without a sentence) and a cost.
+    What does not fit is pruned: a step stays in its word or goes on to the next one, and a goal
+    state counts at the last word.  A state counts only at the least cost at which it was met: an
+    optimal plan is at none of its states later than it could be.  A word takes at least one step,
+    so with ``count_words`` the number of words that are left is a lower bound, too (the paper only
+    prunes).
 
     Costs are lexicographic: steps, second component.  ``bound`` is an admissible, consistent lower
     bound on the steps left.  The next node is one with least (steps + bound, second component),
@@ -156,73 +161,58 @@ def _a_star(
     the one with the smallest labels.
     """
     (start,), last = states.numbers(init[None, :]), len(words or (0,)) - 1
-    height: dict[int, int] = {}  # the lower bound of every state met
+    height = {start: int(bound(init[None, :])[0])}  # the lower bound of every state met
     best: dict[int, Cost] = {start: (0, 0)}
-    ways: dict[Node, tuple[Cost, Node, tuple[int, ...]]] = {}  # cost, predecessor, labels
-    queue: list[tuple[Cost, int, int, int, int, Node, Cost]] = []
-    expanded: set[Node] = set()
+    ways: Ways = {}
+    queue: list[tuple[Cost, int, int, int, int, Node]] = []
+    expanded: list[int] = []
 
-    def put(node: Node, cost: Cost, order: int) -> None:
-        least, left = height[node[0]], last - node[1]
-        if count_words:
-            least = max(least, left)
-        key = (cost[0] + least, cost[1]), least, left, -len(expanded), order
-        heappush(queue, (*key, node, cost))
+    def put(node: Node, order: int) -> None:
+        state, index, (steps, second) = node
+        left = last - index
+        least = max(height[state], left) if count_words else height[state]
+        heappush(queue, ((steps + least, second), least, left, -len(expanded), order, node))
 
-    _bound(states, bound, height, [start])
-    put((start, 0), (0, 0), 0)
-    generated = 1
+    put((start, 0, (0, 0)), 0)
     while queue:
-        *_, node, cost = heappop(queue)
-        if node in expanded or cost != best[node[0]]:
+        *_, node = heappop(queue)
+        state, index, cost = node
+        if cost != best[state]:
             continue
-        goal_holds = states.model.holds(goal, states.rows[node[0]][None, :])
-        if node[1] == last and goal_holds[0]:
-            work = len(expanded), len({state for state, _ in expanded}), generated
-            return _found(states, ways, node, cost, work)
-        expanded.add(node)
-        steps = list(_fitting(states, words, node))
-        _bound(states, bound, height, [target for _, (target, _), _, _ in steps])
-        for order, to, labels, second in steps:
-            after = cost[0] + 1, cost[1] + second
-            is_met = to in ways and ways[to][0] <= after
-            if height[to[0]] < FAR and after <= best.get(to[0], after) and not is_met:
-                best[to[0]], ways[to] = after, (after, node, labels)
-                put(to, after, order)
-                generated += 1
+        if index == last and states.model.holds(goal, states.rows[state][None, :])[0]:
+            return _found(states, ways, node, expanded)
+        expanded.append(state)
+        for order, to, labels in _hopeful(states, bound, height, [*_fitting(states, words, node)]):
+            if to not in ways and to[2] <= best.get(to[0], to[2]):
+                best[to[0]], ways[to] = to[2], (node, labels)
+                put(to, order)
     raise AssertionError("some plan has the sentence")
 
 
-def _fitting(
-    states: ExpandedStates, words: Sequence[int] | None, node: Node
-) -> Iterator[tuple[int, Node, tuple[int, ...], int]]:
-    """The joint steps out of a node that fit the sentence: (number, next node, labels, cost)."""
-    state, index = node
+def _fitting(states: ExpandedStates, words: Sequence[int] | None, node: Node) -> Iterator[Step]:
+    """The joint steps out of a node that fit the sentence."""
+    state, index, (steps, second) = node
     for number, (target, labels, cost) in enumerate(states.steps(state)):
         goes_on = words is not None and states.word[target] != words[index]
         if words is None or not goes_on or states.word[target] in words[index + 1 : index + 2]:
-            yield number, (target, index + goes_on), labels, cost
+            yield number, (target, index + goes_on, (steps + 1, second + cost)), labels
 
 
-def _bound(
-    states: ExpandedStates, bound: Values, height: dict[int, int], met: Sequence[int]
-) -> None:
-    """Bound states, those among them that are new as one table."""
-    if fresh := sorted({*met} - height.keys()):
+def _hopeful(
+    states: ExpandedStates, bound: Values, height: dict[int, int], steps: Sequence[Step]
+) -> list[Step]:
+    """The steps to states that may lead to the goal; states that are new are bounded at once."""
+    if fresh := sorted({to[0] for _, to, _ in steps} - height.keys()):
         rows = np.stack([states.rows[state] for state in fresh])
         height.update(zip(fresh, bound(rows).tolist(), strict=True))
+    return [step for step in steps if height[step[1][0]] < FAR]
 
 
-def _found(
-    states: ExpandedStates,
-    ways: Mapping[Node, tuple[Cost, Node, tuple[int, ...]]],
-    node: Node,
-    cost: Cost,
-    work: tuple[int, int, int],
-) -> GuidedPlan:
-    plan, passed = [], [states.word[node[0]]]
+def _found(states: ExpandedStates, ways: Ways, node: Node, expanded: Sequence[int]) -> GuidedPlan:
+    cost, plan, passed = node[2], [], [states.word[node[0]]]
     while node in ways:
-        _, node, labels = ways[node]
+        node, labels = ways[node]
         plan.append(labels)
         passed.append(states.word[node[0]])
+    work = len(expanded), len({*expanded}), len(ways) + 1
     return GuidedPlan(tuple(reversed(plan)), sentence(reversed(passed)), cost, *work)
