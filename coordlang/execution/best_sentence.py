@@ -249,8 +249,8 @@ def grants(
     fits = task_language.plans_with(words)
     return all(
         one.grade(memory) == 0
-        for (_, memories), after in zip(*_points(fits, int(fits.starts[0]), automata), strict=True)
-        if not after
+        for node, memories in _points(fits, int(fits.starts[0]), automata)[0]
+        if node == _END
         for one, memory in zip(automata, memories, strict=True)
     )
 
@@ -274,25 +274,26 @@ class _Graph:
         self.preferences, self.followed = tuple(preferences), 0
         automata = [one for one in preferences if isinstance(one, PlanPreference)]
         points, self.following = _points(task_language.space, task_language.start, automata)
-        self.node = [node for node, _ in points]
+        self.node, memories = zip(*points, strict=True)
         self.word = [_END if node == _END else int(task_language.word[node]) for node in self.node]
         self.more = [0] * len(points)
-        self.grades: list[tuple[int, ...]] = [()] * len(points)
-        self.open = [Counter[int]() for _ in points] if "most-plans" in preferences else []
+        self.grades = [
+            tuple(one.grade(memory) for one, memory in zip(automata, own, strict=True))
+            for own in memories
+        ]
+        self.open = [Counter({_END: 1}) for _ in points] if "most-plans" in preferences else []
         for at in reversed(range(len(points))):
             if self.following[at]:
                 self._bound_by_followers(at)
-                continue
-            graded = zip(automata, points[at][1], strict=True)
-            self.grades[at] = tuple(one.grade(memory) for one, memory in graded)
-            if self.open:
-                self.open[at][_END] = 1
 
     def _bound_by_followers(self, point: int) -> None:
         here, after = self.word[point], self.following[point]
         self.more[point] = min(self.more[q] + (self.word[q] != here) for q, _ in after)
         self.grades[point] = tuple(map(min, zip(*(self.grades[q] for q, _ in after), strict=True)))
-        for q, number in after if self.open else ():
+        if not self.open:
+            return
+        self.open[point] = Counter()
+        for q, number in after:
             if self.word[q] == here:
                 for word, count in self.open[q].items():
                     self.open[point][word] += number * count

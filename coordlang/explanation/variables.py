@@ -9,9 +9,8 @@ agree in some arguments, the *key*: ``(at r2 a), (at r2 b), ..`` have the key ``
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
-from functools import partial
 from itertools import chain, combinations
 
 import numpy as np
@@ -111,26 +110,36 @@ def _surroundings(model: JointModel, rows: Rows) -> Rows:
 
 
 def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: bool) -> Variable:
-    positions = dict(group.family)
-    subjects = {p: p + _key_text(own, group.key) for p, own in group.family}
-    values: list[Atom | None] = [atoms[number] for number in used]
-    said = []
-    for atom in (atoms[number] for number in used):
-        own = positions[atom.predicate]
-        others = [arg for position, arg in enumerate(atom.args) if position not in own]
-        said.append((subjects[atom.predicate], others))
-    texts = [(subject, _value(map(partial(_short, group.key), others))) for subject, others in said]
+    values = [atoms[number] for number in used]
+    texts = _texts(group, values, group.key)
     if len({*texts}) < len(texts):  # an action is called idle or none
-        texts = [(subject, _value(others)) for subject, others in said]
-    predicates = sorted({atoms[number].predicate for number in group.atoms})
-    name = "/".join(subjects[predicate] for predicate in predicates)
-    if len({positions[predicate] for predicate in predicates}) == 1:
-        name = "/".join(predicates) + _key_text(positions[predicates[0]], group.key)
-    if none:
-        values.append(None)
-        is_object = any(value == "none" for _, value in texts)
-        texts.append((name, "no value" if is_object else "none"))
-    return Variable(name, tuple(values), tuple(texts))
+        texts = _texts(group, values, ())
+    name = _name(group, {atoms[number].predicate for number in group.atoms})
+    if not none:
+        return Variable(name, tuple(values), tuple(texts))
+    is_object = any(value == "none" for _, value in texts)
+    texts.append((name, "no value" if is_object else "none"))
+    return Variable(name, (*values, None), tuple(texts))
+
+
+def _texts(group: _Group, atoms: Sequence[Atom], by: Sequence[str]) -> list[tuple[str, str]]:
+    """The predicate and key of each atom, and its other arguments as the ``by`` say them."""
+    positions, found = dict(group.family), []
+    for atom in atoms:
+        own = positions[atom.predicate]
+        others = [_short(by, arg) for place, arg in enumerate(atom.args) if place not in own]
+        value = ", ".join(others)
+        value = f"({value})" if len(others) > 1 else value
+        found.append((atom.predicate + _key_text(own, group.key), value))
+    return found
+
+
+def _name(group: _Group, predicates: Set[str]) -> str:
+    """The predicates, each with its key, or the key once where it is the same."""
+    keys = {p: _key_text(own, group.key) for p, own in sorted(group.family) if p in predicates}
+    if len({*keys.values()}) == 1:
+        return "/".join(keys) + keys.popitem()[1]
+    return "/".join(map("".join, keys.items()))
 
 
 def _key_text(positions: Sequence[int], key: Sequence[str]) -> str:
@@ -143,14 +152,6 @@ def _key_text(positions: Sequence[int], key: Sequence[str]) -> str:
 def _short(key: Sequence[str], argument: str) -> str:
     """An argument; a remembered subaction as the robot of the key says it of itself."""
     return own_text(argument, key[0]) if key and argument.startswith("(") else argument
-
-
-def _value(arguments: Iterable[str]) -> str:
-    """The other arguments in one text."""
-    texts = [*arguments]
-    if len(texts) == 1:
-        return texts[0]
-    return f"({', '.join(texts)})" if texts else ""
 
 
 # ---- mutex groups
