@@ -77,12 +77,11 @@ class PddlExport:
             )
         space = task_language.plans_with(words)
         makespan, second = space.cost_of(0)
-        steps = makespan if model.slack else None
         start = space.starts[0]
         task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
-        plain = compile_classical(model, task, MAX_ACTIONS, longest=max(1, steps or makespan))
+        plain = compile_classical(model, task, MAX_ACTIONS, longest=max(1, makespan))
         tests = exclusive_terms(task_language)
-        naming = _Naming(task_language, words, plain, tests, steps)
+        naming = _Naming(task_language, words, plain, tests, makespan if model.slack else None)
         named = naming.task()
         if model.slack and not naming.remembered:  # else a rest is seen, and is part of the plan
             makespan, second = plan_under_sentence(task_language, words).cost
@@ -108,24 +107,24 @@ class PddlExport:
         """
         steps: list[dict[int, int]] = [{}]
         for number, name in enumerate(names, 1):
-            labels = self.labels.get(name.lower())
-            if labels is None:
+            chosen = self.labels.get(name.lower())
+            if chosen is None:
                 raise BadInput(
                     f"action {number} of the plan, {echoed(name)}, is none of the exported problem",
                     remedy="Give a plan of the problem that this command exports, with the same "
                     "arguments.",
                 )
-            if any(robot in steps[-1] for robot, _ in labels):
+            if steps[-1].keys() & dict(chosen).keys():
                 steps.append({})
-            steps[-1].update(labels)
+            steps[-1].update(chosen)
         plan = [step for step in steps if step]
         for number, step in enumerate(plan, 1):
-            for robot, name in enumerate(self.model.robots):
-                if robot not in step:
-                    raise BadInput(
-                        f"in step {number} of the plan {name} chooses nothing: the plan is cut off",
-                        remedy="Give the whole plan that the planner wrote.",
-                    )
+            if missing := {*range(len(self.model.robots))} - step.keys():
+                name = self.model.robots[min(missing)]
+                raise BadInput(
+                    f"in step {number} of the plan {name} chooses nothing: the plan is cut off",
+                    remedy="Give the whole plan that the planner wrote.",
+                )
         return tuple(tuple(step[robot] for robot in sorted(step)) for step in plan)
 
 
@@ -264,20 +263,16 @@ class _Naming:
     def following_actions(self) -> list[ClassicalAction]:
         """Actions that stay at a word of the sentence or go on to the next one."""
         found = []
-        for number, (word, said) in enumerate(zip(self.words, self.said, strict=True), 1):
-            here = ((self.named[word], True), (said, True))
-            stay = f"stay in word {number} {self.names[word]}"
-            found.append(_free(stay, here, (self.between,), (self.named[word],)))
-            if number < len(self.words):
-                after = self.words[number]
+        for number, (word, said) in enumerate(zip(self.words, self.said, strict=True)):
+            named, place = self.named[word], f"word {number + 1} {self.names[word]}"
+            if number:
+                before = self.said[number - 1]
+                here = ((named, True), (before, True))
                 found.append(
-                    _free(
-                        f"go on to word {number + 1} {self.names[after]}",
-                        ((self.named[after], True), (said, True)),
-                        (self.between, self.said[number]),
-                        (self.named[after], said),
-                    )
+                    _free(f"go on to {place}", here, (self.between, said), (named, before))
                 )
+            here = ((named, True), (said, True))
+            found.append(_free(f"stay in {place}", here, (self.between,), (named,)))
         return [counted for action in found for counted in self._counted(action)]
 
     def _counted(self, action: ClassicalAction) -> list[ClassicalAction]:
