@@ -127,11 +127,9 @@ def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:
             )
         elif Atom(predicate, tuple(args)) not in model.statics:
             never.append(text)
-    states = codec.facts_part(task_language.space.rows)
     mask = codec.mask(facts)
-    hit: list[int] = ((states & mask) == mask).all(axis=1).astype(int).tolist()
-    if never:
-        hit = [0] * len(states)
+    has_all = (codec.facts_part(task_language.space.rows) & mask == mask).all(axis=1)
+    hit: list[int] = (has_all & (not never)).astype(int).tolist()
     text = " ".join(wanted)
     why = f": {never[0]} can never be true" if never else ""
     grades = (f"it keeps away from {text}{why}", f"it passes through {text}")

@@ -179,6 +179,7 @@ class Agreement:
         self._proposal: str | None = None
         self._answer: Reply | None = None
         self._heard: dict[str, Message] = {}
+        self._said = self.said()
 
     def check(self, message: Message) -> None:
         """Raise `Refuted` if another robot follows another sentence."""
@@ -189,16 +190,14 @@ class Agreement:
     def hears(self, message: Message) -> None:
         """Take in what another robot says, where that is no contradiction."""
         self._heard[message.by] = message
+        self.sentence = self.sentence or message.sentence
 
     def advance(self) -> bool:
-        """Propose, answer or agree, if it can be done now; whether anything was."""
-        before = self.said()
-        if self.sentence is None:
-            told = (message.sentence for message in self._heard.values())
-            self.sentence = next(filter(None, told), None)
+        """Propose, answer or agree, if it can be done now; whether there is something to say."""
         if self.sentence is None and len(self._heard) == len(self.others):
             self._talk()
-        return self.said() != before
+        before, self._said = self._said, self.said()
+        return self._said != before
 
     def _talk(self) -> None:
         speakers = [name for name, message in self._heard.items() if message.speaks]

@@ -17,7 +17,7 @@ import json
 import re
 import zlib
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fnmatch import fnmatchcase
@@ -146,21 +146,15 @@ class Monitor:
         if len(self._atoms) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
         #: What the file says that the robot may do, as it is written there -> the subaction.
-        self._written = {IDLE: IDLE}
-        self._read_passings(entry, where)
-        self._states = _read_states(entry, facts, where, self._check_own)
+        self._written = {IDLE: IDLE, **self._read_events(entry, where)}
+        self._states = _read_states(entry, facts, where, self._written)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(self._states))
         self._here = self._states[0]
         self._has_promised = False
 
-    def _read_passings(self, entry: Mapping[str, Any], where: str) -> None:
-        """Read what events are, where there are no steps."""
-
-    def _check_own(self, text: str, number: int) -> None:
-        """Raise unless a robot can do what a key of 'next' says in a state with this number."""
-        if text not in self._written:
-            _check_plain(text, f"state {number}: 'next'")
-            self._written[text] = text
+    def _read_events(self, entry: Mapping[str, Any], where: str) -> dict[str, str]:
+        """Read what events are, where there are no steps: their subactions."""
+        return {}
 
     @classmethod
     def read(cls, path: str, robot: str | None = None, *, max_bytes: int = MAX_BYTES) -> Self:
@@ -180,8 +174,6 @@ class Monitor:
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         return other
-
-    __copy__ = copy
 
     def after(self, subaction: str | None) -> Self:
         """A monitor of its own that has done this, whatever it would have to wait for."""
@@ -358,21 +350,20 @@ class EventMonitor(Monitor):
         self._ready: dict[str, str] = {}
         self._underway: str | None = None
 
-    def _read_passings(self, entry: Mapping[str, Any], where: str) -> None:
+    def _read_events(self, entry: Mapping[str, Any], where: str) -> dict[str, str]:
         record = _get(entry, "passings", dict, where)
         self._others = _others(record, where)
         self._events = {
             text: _own_event(event, self._others, f"event {_shown(text)}")
             for text, event in _get(record, "events", dict, where).items()
         }
-        events = {text: event.subaction for text, event in self._events.items()}
-        self._written = events | self._written
         #: Own subaction -> other robot -> its subactions that interfere with it.
         self._interferes = _interferes(record, where)
-
-    def _check_own(self, text: str, number: int) -> None:
-        if text not in self._written:
-            raise _broken(f"state {number}: 'events' lacks {_shown(text)}")
+        for number, state in enumerate(_get(entry, "states", list, where)):
+            for text in _get(state, "next", dict, f"state {number}"):
+                if text != IDLE and text not in self._events:
+                    raise _broken(f"state {number}: 'events' lacks {_shown(text)}")
+        return {text: event.subaction for text, event in self._events.items() if text != IDLE}
 
     @property
     def finished(self) -> bool:
@@ -670,14 +661,14 @@ def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
 
 
 def _read_states(
-    entry: Mapping[str, Any], facts: Sequence[str], where: str, check: Callable[[str, int], None]
+    entry: Mapping[str, Any], facts: Sequence[str], where: str, written: dict[str, str]
 ) -> list[_State]:
     """The states of a file, read backwards; 0 is the start.
 
-    ``check`` looks at what 'next' says in a state.  Raises `MonitorError` unless every state can be
-    reached from state 0 in step 0 and leads to later states of the next step, so that there are no
-    cycles, all subplans have one length, and the counts of subplans agree: these never take much
-    more memory than those in the file.
+    ``written`` has texts that are known to be well written, and gets all others.  Raises
+    `MonitorError` unless every state can be reached from state 0 in step 0 and leads to later
+    states of the next step, so that there are no cycles, all subplans have one length, and the
+    counts of subplans agree: these never take much more memory than those in the file.
     """
     records = _get(entry, "states", list, where)
     steps = [_get(record, "step", int, f"state {n}") for n, record in enumerate(records)]
@@ -687,7 +678,7 @@ def _read_states(
     reached, last = {0}, max(steps)
     for number in reversed(range(len(records))):
         record, step = records[number], steps[number]
-        moves = _moves(record, number, step + 1, states, check)
+        moves = _moves(record, number, step + 1, states, written)
         reached.update(moves.values())
         if not moves and step != last:
             raise MonitorError(f"state {number} ends after {step} of {last} steps")
@@ -709,16 +700,14 @@ def _check_whole(entry: Mapping[str, Any], steps: int, subplans: int) -> None:
 
 
 def _moves(
-    record: Any,
-    number: int,
-    step: int,
-    states: Mapping[int, _State],
-    check: Callable[[str, int], None],
+    record: Any, number: int, step: int, states: Mapping[int, _State], written: dict[str, str]
 ) -> dict[str | None, int]:
     """What the robot may do in a state, idling first."""
     moves: dict[str | None, int] = {}
     for text, to in _get(record, "next", dict, f"state {number}").items():
-        check(text, number)
+        if text not in written:
+            _check_plain(text, f"state {number}: 'next'")
+            written[text] = text
         if not _is_number(to) or to not in states or states[to].step != step:
             raise MonitorError(f"state {number} does not lead to a state of step {step}")
         moves[None if text == IDLE else text] = to

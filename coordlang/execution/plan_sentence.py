@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
@@ -234,11 +235,8 @@ class PlanDag:
 
 
 def _plans_through(space: PlanSpace) -> list[int]:
-    below = counts(space)
-    above = [0] * len(space)
-    above[int(space.starts[0])] = 1
-    for layer in range(space.cost_of(0)[0], 0, -1):
-        edges = space.layer_edges(layer)
-        for source, target in zip(edges.source.tolist(), edges.target.tolist(), strict=True):
-            above[target] += above[source]
-    return [a * b for a, b in zip(above, below, strict=True)]
+    below, above = np.array(counts(space), object), np.zeros(len(space), object)
+    above[space.starts[0]] = 1
+    for edges in reversed([*space.edges_by_layer()]):
+        np.add.at(above, edges.target, above[edges.source])
+    return list(above * below)

@@ -23,7 +23,8 @@ from xml.etree import ElementTree as ET
 from coordlang.execution.choices import RobotChoices, SentenceChoices
 from planners.grounding.actions import GroundAction
 from planners.joint.model import IDLE, JointModel
-from planners.pddl.formula_tree import required_atoms
+from planners.joint.states import bits
+from planners.search.goals import goal_facts
 from planners.system.errors import UsageError
 from planners.system.messages import echoed
 
@@ -153,18 +154,16 @@ def _acting(
 ) -> ET.Element:
     """Do the chosen move: of the branches only its own can succeed."""
     act = ET.Element("Fallback", name="act")
-    index = model.codec.facts.index
     for number, (state, label, target) in enumerate(moves):
         branch = ET.SubElement(act, "Sequence")
         ET.SubElement(branch, "ScriptCondition", code=f"move == {number}")
         text = model.subaction_text(own.robot, label)
         if text is not None:
             branch.extend(_awaiting(model, own.robot, label, text))
-            known = own.automaton.known[state].true
-            needed = required_atoms(actions[text].precondition) if text in actions else ()
-            numbers = {index[atom] for atom in needed if atom in index}
-            for fact in sorted(model.codec.facts.texts[n] for n in numbers if known >> n & 1):
-                ET.SubElement(branch, "Condition", ID="Holds", fact=fact)
+            known = {*bits(own.automaton.known[state].true)}
+            needed = goal_facts(model, actions[text].precondition) if text in actions else ()
+            for fact in sorted(known.intersection(needed)):
+                ET.SubElement(branch, "Condition", ID="Holds", fact=model.codec.facts.texts[fact])
             branch.append(_action(text))
         ET.SubElement(branch, "Script", code=f"state := {target}")
     return act
