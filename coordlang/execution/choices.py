@@ -133,11 +133,10 @@ def facts_at_nodes(space: PlanSpace) -> list[int]:
 def own_changes(model: JointModel, robot: int) -> tuple[int, dict[str | None, tuple[int, int]]]:
     """The facts of which every change is certain from the robot's own label, as bits.
 
-    And by own subaction those of them that it adds, and that it deletes.
-
-    Found from the ground actions, without regard to what is reachable: no action without this robot
-    changes the fact, no conditional effect does, and two (joint) actions with the same own part
-    change it in the same way.
+    And by own subaction those of them that it adds, and that it deletes.  Found from the ground
+    actions, without regard to what is reachable: no action without this robot changes the fact, no
+    conditional effect does, and two (joint) actions with the same own part change it in the same
+    way.
     """
     unsure = {*model.slack_facts}  # they change by themselves
     of_part: dict[str | None, FactsOf] = {}
@@ -348,7 +347,7 @@ def _own_event(model: JointModel, robot: int, event: Event) -> OwnEvent:
 
 
 def _interferes(
-    model: JointModel, robot: int, labels: Iterable[int], may_be: Mapping[str, _Events]
+    model: JointModel, robot: int, labels: Iterable[int], may_be: Mapping[str, list[dict[str, int]]]
 ) -> dict[str, dict[str, list[str]]]:
     """For each own subaction those that others may do and that interfere with it."""
     interfering = Traces(model).interfering
@@ -366,17 +365,10 @@ def _interferes(
     }
 
 
-#: What each event of a robot may be -> the least number of events that it waits for.
-_Events = list[dict[str, int]]
-
-
-def _events_of(fits: PlanSpace, robot: int, waiting_for: int) -> _Events:
-    """What a robot's first event may be, its second one and so on.
-
-    With the least number of events of another robot that it waits for.
-    """
+def _events_of(fits: PlanSpace, robot: int, waiting_for: int) -> list[dict[str, int]]:
+    """What a robot's events may be, one by one -> how many of another robot's they wait for."""
     texts = fits.model.in_step.labels[robot]
-    found: _Events = []
+    found: list[dict[str, int]] = []
     for numbers in fits.labels_by_step(robot):
         waits: dict[int, int] = {}
         for event in filter(None, (fits.model.events[robot][number] for number in numbers)):

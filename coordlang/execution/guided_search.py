@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from heapq import heappop, heappush
 
 import numpy as np
@@ -58,7 +59,8 @@ class ExpandedStates:
         self.model, self.partition = model, partition
         self.rows, self.word = list[Rows](), list[int]()
         self._number: dict[bytes, int] = {}
-        self._steps: dict[int, list[tuple[int, tuple[int, ...], int]]] = {}
+        #: The joint steps out of a state, (next state, labels, second cost), sorted by labels.
+        self.steps = cache(self._steps)
 
     def numbers(self, rows: Rows) -> list[int]:
         """The numbers of the states of a table, which get one if they have none yet."""
@@ -70,14 +72,10 @@ class ExpandedStates:
             self.word.append(word)
         return [self._number[key] for key in keys]
 
-    def steps(self, state: int) -> list[tuple[int, tuple[int, ...], int]]:
-        """The joint steps out of a state, (next state, labels, second cost), sorted by labels."""
-        if state not in self._steps:
-            found = self.model.successors(self.rows[state][None, :])
-            targets = self.numbers(found.result)
-            labels = [tuple(step) for step in found.labels.tolist()]
-            self._steps[state] = list(zip(targets, labels, found.cost.tolist(), strict=True))
-        return self._steps[state]
+    def _steps(self, state: int) -> list[tuple[int, tuple[int, ...], int]]:
+        found = self.model.successors(self.rows[state][None, :])
+        labels = [tuple(step) for step in found.labels.tolist()]
+        return list(zip(self.numbers(found.result), labels, found.cost.tolist(), strict=True))
 
 
 def plan_under_sentence(

@@ -190,10 +190,7 @@ class DagNode(msgspec.Struct, frozen=True, rename={"key": "state", "words": "sai
 
 
 class DagEdge(msgspec.Struct, frozen=True, rename={"source": "from", "target": "to"}):
-    """The joint actions from one node to another (numbers in `PlanDag.nodes`).
-
-    ``actions`` has a text or None (idle) for each robot.
-    """
+    """Joint actions, each robot's text or None, between two nodes (numbers in `PlanDag.nodes`)."""
 
     source: int
     target: int

@@ -157,19 +157,16 @@ class TaskLanguage:
         ends = layers[-1][1] == length - 1
         if not ends.any():
             furthest = max(int(index.max()) for _, index in layers if len(index))
-            nodes = [n for node, index in layers for n in node[index == furthest].tolist()]
+            nodes = np.concatenate([node[index == furthest] for node, index in layers])
             raise NoPlanFits(self, words, furthest + 1, self._next_words(nodes))
         return PlanSpace.from_layers(space, [node for node, _ in layers], steps, self.task, ends)
 
-    def _next_words(self, nodes: Sequence[int]) -> list[int | None]:
-        """The words to which plans go on from some nodes, None where they may end."""
-        following: set[int | None] = set()
-        for node in nodes:
-            after = self.space.successors(node)
-            following |= set(self.word[after].tolist()) - {int(self.word[node])}
-            if not after:
-                following.add(None)
-        return sorted(following, key=lambda w: (w is None, w))
+    def _next_words(self, nodes: Ints) -> list[int | None]:
+        """The words to which plans go on from some nodes of one word, None where they may end."""
+        after = self.space.targets(self.space.edges_from(nodes)[1])
+        following = {*self.word[after].tolist()} - {int(self.word[nodes[0]])}
+        may_end = (self.space.layer[nodes] == 0).any()
+        return [*sorted(following), None] if may_end else sorted(following)
 
     def text(self, words: Sequence[int]) -> str:
         """A sentence as it is written."""

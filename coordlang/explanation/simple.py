@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from sys import maxsize
 
@@ -21,7 +22,7 @@ from coordlang.explanation.variables import valuation
 from coordlang.explanation.words import MappedStates, all_covers
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.languages import Languages
-from coordlang.vocabulary.loop import Budget, close_bounds
+from coordlang.vocabulary.loop import Budget, close_bounds, find
 from coordlang.vocabulary.sat import (
     PartitionProblem,
     Undecided,
@@ -113,25 +114,21 @@ class _Search:
         order = most_constrained_first(self._job.states, clauses)
         problem = FormulaProblem(order, self._found.size, self._value, self._sizes, terms, limits)
         with closing(problem):
-            for _ in range(budget.rounds):
-                for clause in clauses:
-                    problem.separate_one(clause)
-                seen = len(self._languages.clauses)
-                partition = problem.solve(budget.conflicts)
-                if partition is None or self._is_accepted(partition, problem):
-                    return partition is not None
-                clauses = self._languages.clauses[seen:]
-        raise Undecided
+            for clause in clauses:
+                problem.separate_one(clause)
+            return find(problem.solve, partial(self._is_accepted, problem), budget) is not None
 
-    def _is_accepted(self, partition: dict[int, int], problem: FormulaProblem) -> bool:
-        """Whether a partition is a language; then it is the best."""
-        lengths = problem.lengths()
+    def _is_accepted(self, problem: FormulaProblem, partition: dict[int, int]) -> bool:
+        """Whether a partition is a language; then it is the best, else it does not come again."""
+        lengths, known = problem.lengths(), len(self._languages.clauses)
         self._job.progress(
             f"{self._found.size} words with formulas of {self.bound[0]} to {self.lengths[0]} "
             f"terms: trying {lengths[0]} over {lengths[1]} variables, "
             f"{len(self._languages.clauses):,} clauses"
         )
         if not self._languages.holds(partition):
+            for clause in self._languages.clauses[known:]:
+                problem.separate_one(clause)
             return False
         self._job.check(partition)
         self.best, self.lengths = partition, lengths

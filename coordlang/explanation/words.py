@@ -83,10 +83,7 @@ class Cover:
 
     @property
     def length(self) -> int:
-        """The length of the formula.
-
-        Values that its text mentions, and one more for each term after the first.
-        """
+        """The values that its text mentions, and one more for each term after the first."""
         values = sum(literal.length for term in self.terms for literal in term)
         return values + max(0, len(self.terms) - 1)
 
@@ -205,11 +202,7 @@ class WordDescriptions:
 
     @property
     def length(self) -> int:
-        """How long a description is.
-
-        Values that are mentioned, terms after the first of a formula, and one for "every other
-        state".
-        """
+        """The lengths of the formulas, and one for "every other state"."""
         return sum(formula.length if formula else 1 for _, formula in self.rules)
 
 

@@ -218,10 +218,7 @@ def _leaf_model(kind: str, name: str, ports: Sequence[str]) -> ET.Element:
 
 
 def _set_ids(root: ET.Element, model: JointModel) -> None:
-    """Give each tree and each action an ID of its own that BehaviorTree.CPP takes.
-
-    Most have their names already.
-    """
+    """Give each tree and action an ID of its own that BehaviorTree.CPP takes: mostly its name."""
     texts = chain.from_iterable(own[1:] for own in model.in_step.labels)
     named = {("Action", text.strip("()").split()[0]) for text in texts}
     named |= {("BehaviorTree", robot) for robot in model.robots}

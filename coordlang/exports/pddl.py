@@ -222,10 +222,7 @@ class _Naming:
         return len(self.texts) - 1
 
     def within(self, action: ClassicalAction) -> ClassicalAction:
-        """An action of the plain task with the new facts.
-
-        What ends a step leads to naming, and what is remembered is noted.
-        """
+        """An action of the plain task that leads to naming at the end of a step, and remembers."""
         conditions, adds, deletes = {*action.preconditions}, {*action.adds}, {*action.deletes}
         if self.explicit:
             conditions.add((self.between, True))
