@@ -273,7 +273,8 @@ class _Graph:
         automata = [one for one in preferences if isinstance(one, PlanPreference)]
         points, self.following = _points(task_language.space, task_language.start, automata)
         self.node, memories = zip(*points, strict=True)
-        self.word = [_END if node == _END else int(task_language.word[node]) for node in self.node]
+        words = [*task_language.word.tolist(), _END]  # the last one is that of the node `_END`
+        self.word = [words[node] for node in self.node]
         self.more = [0] * len(points)
         self.grades = [
             tuple(one.grade(memory) for one, memory in zip(automata, own, strict=True))

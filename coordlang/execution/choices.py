@@ -219,8 +219,7 @@ class RobotRecord(msgspec.Struct, frozen=True):
     others: Annotated[list[str], doc("The other atoms that can change.")]
     states: Annotated[list[StateRecord], doc("The states of the automaton.")]
     passings: Annotated[
-        Passings | UnsetType,
-        doc("What it waits for; missing where robots step together."),
+        Passings | UnsetType, doc("What it waits for; missing where robots step together.")
     ] = UNSET
 
 
@@ -237,8 +236,7 @@ class ChoicesFile(msgspec.Struct, frozen=True):
     covered: Annotated[bool, doc("Whether it is a candidate task of the language.")]
     guaranteed: Annotated[bool, doc("Whether every combination of choices is an optimal plan.")]
     combinations_walked: Annotated[
-        int | None,
-        doc("Nodes that were walked to prove it; null if there were too many."),
+        int | None, doc("Nodes that were walked to prove it; null if there were too many.")
     ]
     choices: Annotated[list[RobotRecord], doc("The choices of each robot that was asked for.")]
     tolerance: Annotated[

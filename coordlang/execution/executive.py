@@ -414,19 +414,22 @@ class Executive:
         events = self._own.events
         if self.is_done or len(events) > self._counted[self.robot]:
             return False
-        free = () if monitor.finished else monitor.free()
-        event = self._choice(monitor, free) if free else None
-        if event is not None:
+        event = None
+        if not monitor.finished:
+            free = monitor.free()
+            if not free:
+                return False  # all that it may do waits for others
+            event = self._choice(monitor, free)
+            if event is None:
+                monitor.did(None)
+        if event is None:
+            self._own.advance(is_done=True)
+        else:
             events.append(Event(event, monitor.subaction(event), monitor.partners(event)))
             self._own.advance()
-            if events[-1].partners:
-                self._to_tell |= {*self.others}
-        elif free or monitor.finished:
-            if free:
-                monitor.did(None)
-            self._own.advance(is_done=True)
+        if event is None or events[-1].partners:
             self._to_tell |= {*self.others}
-        return event is not None or self.is_done
+        return True
 
     def _choice(self, monitor: EventMonitor, free: Sequence[str | None]) -> str | None:
         if self.random is not None:

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
+from itertools import count
 from typing import Any
 
 import msgspec
@@ -86,14 +88,8 @@ def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan,
     """
     model, space = task_language.model.in_step, task_language.space
     init = model.forgetting_slack(space.rows[space.state[task_language.start]])
-    numbers: list[tuple[int, ...]] = []
-
-    def steps() -> Iterator[tuple[int, ...]]:
-        for number, step in enumerate(plan):
-            numbers.append(_label_numbers(model, step, number))
-            yield numbers[-1]
-
-    rows, second, why = carried_out(model, init, steps())
+    labels = partial(_label_numbers, model)
+    rows, second, why = carried_out(model, init, map(labels, plan, count()))
     for number, (step, row) in enumerate(zip(plan, rows, strict=False)):
         # Another joint action of the same parts may be possible there.
         if isinstance(step, WholeStep) and not model.holds(step.action.precondition, row[None])[0]:
@@ -113,7 +109,7 @@ def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan,
             f"after {counted(len(plan), 'step')} {_unmet(model, goal, rows[-1])}",
             remedy="Give the whole plan: it ends where the goal holds.",
         )
-    return tuple(numbers), rows, second
+    return tuple(map(labels, plan, count())), rows, second
 
 
 def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:
@@ -217,10 +213,9 @@ class PlanDag:
                 key, said = model.codec.key(space.rows[space.state[node]]), int(passed[node])
                 self.nodes.append(DagNode(key, names[word[node]], said, step, through[node]))
         found: dict[tuple[int, int], list[tuple[str | None, ...]]] = {}
-        for node in range(len(space)):
-            for edge in space.out_edges(node):
-                ends = number[node], number[space.target_of(edge)]
-                found.setdefault(ends, []).append(model.texts(space.labels_of(edge)))
+        for edge, node in enumerate(space.sources.tolist()):
+            ends = number[node], number[space.target_of(edge)]
+            found.setdefault(ends, []).append(model.texts(space.labels_of(edge)))
         self.edges = [DagEdge(*ends, tuple(actions)) for ends, actions in sorted(found.items())]
 
     def data(self) -> dict[str, Any]:

@@ -54,9 +54,7 @@ class Way(msgspec.Struct, frozen=True):
 
 
 class WordChange(
-    msgspec.Struct,
-    frozen=True,
-    rename={"before": "from", "after": "to", "robots": "decided_by"},
+    msgspec.Struct, frozen=True, rename={"before": "from", "after": "to", "robots": "decided_by"}
 ):
     """A change from one word of the sentence to the next one.
 
@@ -155,7 +153,7 @@ def meaning(spaces: Sequence[PlanSpace]) -> tuple[str, list[tuple[str, ...]]] | 
     """
     if spaces[0].model.is_asynchronous or any(len(s.target) > _MEANT for s in spaces):
         return None
-    first = [_first_users(space) for space in spaces]
+    first = [*map(_first_users, spaces)]
     meant = []
     for name in sorted({*chain(*first)} - {*spaces[0].model.robots}, key=natural):
         answers = [users.get(name, ()) for users in first]

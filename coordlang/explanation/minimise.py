@@ -321,7 +321,7 @@ def _hitting(rows: Bools, weights: Sequence[int]) -> Sequence[int]:
         chosen.append(min(every, key=lambda v: (-gain[v], weights[v], v)))
         left = left[~left[:, chosen[-1]]]
     for v in sorted(chosen, key=lambda v: -weights[v]):  # without superfluous ones
-        others = [c for c in chosen if c != v]
+        others = sorted({*chosen} - {v})
         if rows[:, others].any(axis=1).all():
             chosen = others
     return chosen

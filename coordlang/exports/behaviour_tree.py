@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain
+from itertools import chain, product
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -41,7 +41,7 @@ class _Leaf(NamedTuple):
 _STEP_LEAVES = {
     "AwaitStep": _Leaf(
         "Action", ("step",), "is running until this joint step begins; steps count from 0"
-    ),
+    )
 }
 _EVENT_LEAVES = {
     "AwaitEnded": _Leaf(
@@ -221,7 +221,7 @@ def _set_ids(root: ET.Element, model: JointModel) -> None:
     """Give each tree and action an ID of its own that BehaviorTree.CPP takes: mostly its name."""
     texts = chain.from_iterable(own[1:] for own in model.in_step.labels)
     named = {("Action", text.strip("()").split()[0]) for text in texts}
-    named |= {("BehaviorTree", robot) for robot in model.robots}
+    named.update(product(["BehaviorTree"], model.robots))
     ids: dict[tuple[str, str], str] = {}
     for kind, name in sorted(named, key=lambda own: (bool(_FORBIDDEN.search(own[1])), own)):
         ids[kind, name] = _FORBIDDEN.sub("_", name)
