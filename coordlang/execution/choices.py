@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import and_
 from typing import Annotated, Any, Literal
 
 import msgspec
+import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from coordlang.execution.automaton import Automaton, Knowledge, determinise
@@ -89,38 +90,30 @@ def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST)
     space = mixtures.space if mixtures and not model.is_asynchronous else None
     truth = [] if space is None else facts_at_nodes(space)
     robots = []
-    for robot, own in enumerate(subplans):
+    for robot in range(len(subplans)):
         exact = None
         with suppress(OutOfMemory):  # the combinations are checked all the same
             exact = space and determinise(space, robot, truth, most)
-        robots.append(
-            RobotChoices(robot, exact, "exact") if exact else knowing_own(fits, robot, own)
-        )
+        robots.append(RobotChoices(robot, exact, "exact") if exact else knowing_own(fits, robot))
     return SentenceChoices(task_language, tuple(words), fits, tuple(robots), mixtures)
 
 
-def knowing_own(fits: PlanSpace, robot: int, subplans: Automaton | None = None) -> RobotChoices:
+def knowing_own(fits: PlanSpace, robot: int) -> RobotChoices:
     """A robot's subplans; of what its own subactions alone change it knows the values."""
-    model, subplans = fits.model, subplans or determinise(fits, robot)
+    model, start = fits.model, int(fits.starts[0])
     facts, changes = own_changes(model, robot)
     others = ((1 << len(model.codec.facts)) - 1) & ~facts
-    start = model.codec.fact_bits(fits.rows[fits.state[fits.starts[0]]])
-    # States of the automaton with the true facts there, numbered in the order of a walk.
-    found = {(0, start & facts): 0}
-    layers: list[range] = []
-    moves: list[dict[int, int]] = []
-    for _ in subplans.layers:
-        here = list(found)[len(moves) :]
-        layers.append(range(len(moves), len(moves) + len(here)))
-        for state, true in here:
-            moves.append({})
-            for label, to in subplans.moves[state].items():
-                adds, deletes = changes.get(model.subaction_text(robot, label), (0, 0))
-                after = to, (true & ~deletes) | adds
-                moves[-1][label] = found.setdefault(after, len(found))
-    left = tuple(subplans.left[state] for state, _ in found)
-    known = tuple(Knowledge(true, true | others) for _, true in found)
-    return RobotChoices(robot, Automaton(tuple(layers), tuple(moves), left, known), "own")
+    numbers = range(len(model.labels[robot]))
+    by_label = [changes.get(model.subaction_text(robot, label), (0, 0)) for label in numbers]
+    true = [0] * len(fits)
+    true[start] = facts & model.codec.fact_bits(fits.rows[fits.state[start]])
+    edges = fits.sources, fits.robot_labels(robot), fits.targets()
+    for node, label, after in np.column_stack(edges)[::-1].tolist():  # from the start down
+        adds, deletes = by_label[label]
+        true[after] = (true[node] & ~deletes) | adds  # the same on all ways to a node
+    automaton = determinise(fits, robot, true)
+    known = tuple(Knowledge(own.true, own.true | others) for own in automaton.known)
+    return RobotChoices(robot, replace(automaton, known=known), "own")
 
 
 def facts_at_nodes(space: PlanSpace) -> list[int]:
