@@ -69,7 +69,8 @@ class SentenceChoices:
     @property
     def guaranteed(self) -> bool:
         """Whether every combination is optimal, by a walk of all or by the language's guarantee."""
-        return self.task_language.guaranteed if self.mixtures is None else self.mixtures.holds
+        found = self.mixtures
+        return self.task_language.guaranteed if found is None else found.witness is None
 
 
 def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST) -> SentenceChoices:
@@ -88,7 +89,8 @@ def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST)
         mixtures = walk_mixtures(task_language, fits, subplans, words, most)
     # Without a common step a node is no state in which a robot is when it has done its events.
     space = mixtures.space if mixtures and not model.is_asynchronous else None
-    truth = [] if space is None else facts_at_nodes(space)
+    facts = [*map(model.codec.fact_bits, fits.rows)]
+    truth = [facts[state] for state in space.state.tolist()] if space else []
     robots = []
     for robot in range(len(subplans)):
         exact = None
@@ -114,13 +116,6 @@ def knowing_own(fits: PlanSpace, robot: int) -> RobotChoices:
     automaton = determinise(fits, robot, true)
     known = tuple(Knowledge(own.true, own.true | others) for own in automaton.known)
     return RobotChoices(robot, replace(automaton, known=known), "own")
-
-
-def facts_at_nodes(space: PlanSpace) -> list[int]:
-    """The true facts at each node, as bits."""
-    codec, states = space.model.codec, space.state.tolist()
-    bits = {state: codec.fact_bits(space.rows[state]) for state in set(states)}
-    return [bits[state] for state in states]
 
 
 def own_changes(model: JointModel, robot: int) -> tuple[int, dict[str | None, tuple[int, int]]]:

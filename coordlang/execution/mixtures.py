@@ -33,11 +33,6 @@ class Mixtures:
     witness: Miscoordination | None
     nodes: int
 
-    @property
-    def holds(self) -> bool:
-        """Whether every combination is an optimal plan."""
-        return self.witness is None
-
 
 def walk_mixtures(
     task_language: TaskLanguage,
