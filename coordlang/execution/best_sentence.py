@@ -315,10 +315,7 @@ class _Graph:
         return further
 
     def bound(self, words: Sequence[int], counts: Mapping[int, int]) -> tuple[Any, ...]:
-        """The best values that any sentence with this prefix can have, and its least length.
-
-        Of a whole sentence they are its own.
-        """
+        """The best values and least length of sentences with a prefix; its own if it is whole."""
         length = len(words) - 1 + min(self.more[p] for p in counts)
         most = Counter[int]()
         for point, count in counts.items() if self.open else ():

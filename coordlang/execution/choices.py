@@ -336,16 +336,16 @@ def _interferes(
     model: JointModel, robot: int, labels: Iterable[int], may_be: Mapping[str, list[dict[str, int]]]
 ) -> dict[str, dict[str, list[str]]]:
     """For each own subaction those that others may do and that interfere with it."""
-    interfering = Traces(model).interfering
+    interfering, texts = Traces(model).interfering, model.labels
     heard = {model.robots.index(name): set().union(*its) for name, its in may_be.items()}
     return {
-        model.labels[robot][label]: {
+        texts[robot][label]: {
             model.robots[other]: [
                 text
-                for its, text in enumerate(model.labels[other])
-                if text in texts and interfering[robot, other][label, its]
+                for its, text in enumerate(texts[other])
+                if text in its_texts and interfering[robot, other][label, its]
             ]
-            for other, texts in heard.items()
+            for other, its_texts in heard.items()
         }
         for label in labels
     }

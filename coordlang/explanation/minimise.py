@@ -174,8 +174,7 @@ def _irredundant(points: Points, pool: Bools) -> Bools:
     gain = held.sum(axis=1)
     chosen: list[int] = []
     while left.any():
-        best = np.flatnonzero(gain == gain.max())
-        chosen.append(int(best[np.argmin(limited[best])]))
+        chosen.append(int(np.lexsort((limited, -gain))[0]))  # of equal gain the least limited
         taken = held[chosen[-1]] & left
         gain = gain - held[:, taken].sum(axis=1)
         left &= ~taken

@@ -193,7 +193,6 @@ class _Naming:
         for atom, true in self.remembered.items():
             self.number[atom] = self.add(show(atom))
             self.init |= {self.number[atom]} if true else set()
-        self.first_new = len(self.model.codec.facts)  # from here on, facts of the compilation
         self.explicit = plain.between is None
         #: Between two joint steps: select-then-apply has a fact for this already.
         self.between = self.add("(time to act)") if plain.between is None else plain.between
@@ -289,8 +288,8 @@ class _Naming:
     def goal(self) -> tuple[Condition, ...]:
         """The whole sentence is passed, and the last state is named, by ``reach the goal``, too."""
         conditions = {*self.plain.goal, (self.said[-1], True)}
-        old = (number < self.first_new or number == self.between for number, _ in self.plain.goal)
-        if all(old):
+        old = {self.between, *range(len(self.model.codec.facts))}  # further ones: the compilation's
+        if all(number in old for number, _ in self.plain.goal):
             conditions.add((self.between, True))
         if self.remembered:  # a rest may add words
             conditions |= {(step, True) for step in self.taken[-1:]}
