@@ -734,12 +734,11 @@ def _check_count(record: Mapping[str, Any], key: str, count: int, where: str) ->
     if key not in record:
         raise _broken(f"{where}: '{key}' is missing")
     said = record[key]
-    if isinstance(said, str) and said.isascii() and said.isdigit() and said[0] != "0":
-        said = Decimal(said)  # exact, and unlike `int` not limited to some digits
-    if not (_is_number(said) or isinstance(said, Decimal)) or said != count:
+    is_digits = isinstance(said, str) and re.fullmatch("[1-9][0-9]*", said)
+    # A `Decimal` is exact, and unlike `int` not limited to some digits.
+    if not (is_digits or _is_number(said)) or Decimal(said) != count:
         number = str(count) if count.bit_length() < 256 else f"about 2^{count.bit_length()}"
-        shown = _shown(record[key])
-        raise MonitorError(f"{where} says {shown} subplans are left, but there are {number}")
+        raise MonitorError(f"{where} says {_shown(said)} subplans are left, but there are {number}")
 
 
 def _texts(value: Texts) -> tuple[str, ...]:

@@ -79,8 +79,7 @@ def behaviour_trees(choices: SentenceChoices) -> str:
     model = choices.task_language.model
     root = ET.Element("root", BTCPP_format="4")
     root.append(ET.Comment(_comment(choices)))
-    for own in choices.robots:
-        root.append(_tree(model, own))
+    root.extend(_tree(model, own) for own in choices.robots)
     root.append(_models(model, choices))
     _set_ids(root, model)
     ET.indent(root)
@@ -196,8 +195,7 @@ def _action(text: str) -> ET.Element:
 def _models(model: JointModel, choices: SentenceChoices) -> ET.Element:
     """The ports of all leaves, which editors of trees ask for."""
     found = ET.Element("TreeNodesModel")
-    for name, leaf in _leaves(model).items():
-        found.append(_leaf_model(leaf.kind, name, leaf.ports))
+    found.extend(_leaf_model(one.kind, name, one.ports) for name, one in _leaves(model).items())
     ports: dict[str, int] = {}
     for own in choices.robots:
         for label in sorted(own.automaton.labels):
