@@ -748,7 +748,9 @@ def _texts(value: Texts) -> tuple[str, ...]:
 
 def _plain(text: str | None) -> str:
     """PDDL text in lower case with single spaces; raises `MonitorError` for anything else."""
-    plain = IDLE if text is None else _plain_or_none(text) if isinstance(text, str) else None
+    if text is None:
+        return IDLE
+    plain = _plain_or_none(text) if isinstance(text, str) else None
     if plain is None:
         raise MonitorError(
             f"'{_shown(text)}' is no PDDL text such as (move r1 a b), and not 'idle'"

@@ -89,11 +89,9 @@ class SentenceDemands:
 
     def data(self) -> dict[str, Any]:
         """What it demands, for JSON; steps count from 1, null is idling."""
-        robots = msgspec.to_builtins(self.parts)
-        for part in robots:
-            del part["by_step"]
+        own = [{"robot": p.robot, "subplans": p.subplans, "listed": p.listed} for p in self.parts]
         changes = msgspec.to_builtins(self.changes)
-        return {"steps": self.steps, "robots": robots, "changes": changes}
+        return {"steps": self.steps, "robots": own, "changes": changes}
 
 
 def sentence_demands(
