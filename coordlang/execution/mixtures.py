@@ -77,28 +77,23 @@ def walk_mixtures(
 
 
 class _Moves:
-    """An automaton's moves: for each state their number and the position of the first one."""
+    """An automaton's moves, (label, next state): for each state their number and the first one."""
 
     def __init__(self, automaton: Automaton) -> None:
         self.degree = np.array([len(own) for own in automaton.moves], np.int64)
         self.first = np.cumsum(self.degree) - self.degree
         pairs = [pair for own in automaton.moves for pair in own.items()]
-        self.label, self.target = np.array(pairs, np.int64).reshape(-1, 2).T
+        self.pairs = np.array(pairs, np.int64).reshape(-1, 2)
 
 
 def _together(moves: Sequence[_Moves], table: Ints) -> tuple[Ints, Labels, Ints]:
     """All joint moves, sorted by source and labels: (source, labels, next automaton states)."""
-    source = np.arange(len(table))
-    labels: list[Ints] = []
-    after: list[Ints] = []
+    found = np.arange(len(table))[:, None]  # the source, then for each robot label and next state
     for robot, own in enumerate(moves):
-        state = table[source, robot]
-        earlier = np.repeat(np.arange(len(source)), own.degree[state])
+        state = table[found[:, 0], robot]
         edges = ranges(own.first[state], own.degree[state])
-        source = source[earlier]
-        labels = [*(column[earlier] for column in labels), own.label[edges]]
-        after = [*(column[earlier] for column in after), own.target[edges]]
-    return source, np.stack(labels, axis=1).astype(np.int32), np.stack(after, axis=1)
+        found = np.hstack((np.repeat(found, own.degree[state], axis=0), own.pairs[edges]))
+    return found[:, 0], found[:, 1::2].astype(np.int32), found[:, 2::2]
 
 
 def _witness(
