@@ -12,7 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from itertools import chain
+from itertools import accumulate, chain
 from operator import and_, or_
 from typing import NamedTuple
 
@@ -156,16 +156,11 @@ def _alike(
 
 def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:
     """Number the states layer by layer, where a walk by labels has met them in their order."""
-    layers: list[range] = []
-    numbered: list[Mapping[int, int]] = []
-    known: list[Knowledge] = []
-    for layer in merged:
-        end = len(numbered) + len(layer)
-        layers.append(range(len(numbered), end))
-        for knowledge, moves in layer:
-            known.append(knowledge)
-            numbered.append({own: end + to for own, to in moves})
-    left = [1] * len(known)
+    ends = [*accumulate(map(len, merged))]
+    layers = tuple(range(end - len(own), end) for own, end in zip(merged, ends, strict=True))
+    states = [(end, *state) for own, end in zip(merged, ends, strict=True) for state in own]
+    moves = tuple({label: end + to for label, to in after} for end, _, after in states)
+    left = [1] * len(states)
     for state in reversed(range(layers[-1].start)):
-        left[state] = sum(left[to] for to in numbered[state].values())
-    return Automaton(tuple(layers), tuple(numbered), tuple(left), tuple(known))
+        left[state] = sum(left[to] for to in moves[state].values())
+    return Automaton(layers, moves, tuple(left), tuple(known for _, known, _ in states))
