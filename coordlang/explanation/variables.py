@@ -122,12 +122,12 @@ def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: b
     return Variable(name, (*values, None), tuple(texts))
 
 
-def _texts(group: _Group, atoms: Sequence[Atom], by: Sequence[str]) -> list[tuple[str, str]]:
-    """The predicate and key of each atom, and its other arguments as the ``by`` say them."""
+def _texts(group: _Group, atoms: Sequence[Atom], key: Sequence[str]) -> list[tuple[str, str]]:
+    """For each atom its predicate with the group's key, and its other arguments (`_short`)."""
     positions, found = dict(group.family), []
     for atom in atoms:
         own = positions[atom.predicate]
-        others = [_short(by, arg) for place, arg in enumerate(atom.args) if place not in own]
+        others = [_short(key, arg) for place, arg in enumerate(atom.args) if place not in own]
         value = ", ".join(others)
         value = f"({value})" if len(others) > 1 else value
         found.append((atom.predicate + _key_text(own, group.key), value))
