@@ -35,7 +35,8 @@ class Option(NamedTuple):
     ``names`` are its spellings (none: ``--`` and the field's name), ``least`` is the smallest
     number.  It can be given in one place ``only``.  It ``is_output`` where it names a file that is
     written, or a folder, in which ``files`` are.  It ``needs`` another option, or one with one of
-    some values, and excludes those ``without`` which it must be given.
+    some values, and excludes those ``without`` which it must be given.  It ``takes_none`` where
+    that says something else than the default.
     """
 
     help: str
@@ -99,7 +100,8 @@ def options_of(record: type[object]) -> Iterator[Option]:
                 yield inner._replace(only="python") if hidden else inner
         elif "option" in each.metadata:
             given, described = _not_none(each.type), each.metadata["option"]
-            more: dict[str, Any] = {"kind": given, "takes_none": given != each.type}
+            takes_none = given != each.type and each.default is not None
+            more: dict[str, Any] = {"kind": given, "takes_none": takes_none}
             yield described._replace(name=each.name, default=each.default, **more)
 
 
@@ -128,22 +130,23 @@ def record_from(
     known = {o.name: o for o in options_of(record) if on_cli or o.only != "cli"}
     for name in given:
         if name not in known:
-            from difflib import get_close_matches
-
-            alike = get_close_matches(name, known, 1)
-            hint = f"; did you mean {alike[0]!r}?" if alike else ""
-            raise TypeError(f"{caller}() got an unexpected keyword argument {name!r}{hint}")
+            raise _unexpected(caller, name, known)
     values = {
-        name: value
+        name: value if value is None else checked_value(known[name], value)
         for name, value in given.items()
-        if value is not None or (known[name].takes_none and known[name].default is not None)
+        if value is not None or known[name].takes_none
     }
-    for name, value in values.items():
-        if value is not None:
-            values[name] = checked_value(known[name], value)
     _refuse_contradictions(known, values)
     made: Record = _made(record, values)
     return made
+
+
+def _unexpected(caller: str, name: str, known: Iterable[str]) -> TypeError:
+    from difflib import get_close_matches
+
+    alike = [f"; did you mean {each!r}?" for each in get_close_matches(name, known, 1)]
+    what = f"{caller}() got an unexpected keyword argument {name!r}"
+    return TypeError("".join((what, *alike)))
 
 
 def _made(record: type[Any], values: Mapping[str, object]) -> Any:
@@ -193,38 +196,46 @@ def _require(needed: Option, value: object, by: Option, own: object, is_given: b
     raise UsageError(f"{belongs} {named(accepted, 'or')}" if accepted else belongs, remedy=remedy)
 
 
-def checked_value(given: Option, value: object) -> object:
+def checked_value(given: Option, value: Any) -> object:
     """The value of an option; items that come only once, in a tuple.
 
     Raises `UsageError` for a value of another kind, a number below the least, or no path.
     """
     if isinstance(value, Iterator):
         value = tuple(value)
-    if given.values and value not in given.values:
-        raise UsageError(
-            f"{given.spelling} {value}: there is no such value",
-            remedy=f"Say {named(given.values, 'or')}.",
-        )
-    if given.kind is bool and not isinstance(value, bool):
-        raise UsageError(
-            f"{given.spelling} is given or not: {value} is neither",
-            remedy="In Python it is True or False.",
-        )
-    if not given.values and given.kind not in (bool, int):
+    if given.values:
+        if value not in given.values:
+            raise UsageError(
+                f"{given.spelling} {value}: there is no such value",
+                remedy=f"Say {named(given.values, 'or')}.",
+            )
+    elif given.kind is bool:
+        if not isinstance(value, bool):
+            raise UsageError(
+                f"{given.spelling} is given or not: {value} is neither",
+                remedy="In Python it is True or False.",
+            )
+    elif given.kind is int:
+        _check_number(given, value)
+    else:
         _check_kind(given, value)
-    least = given.least
-    if given.kind is int and (type(value) is not int or (least is not None and value < least)):
-        what = "a whole number" if least is None else f"{least} or more"
-        raise UsageError(
-            f"{given.spelling} {value}: expected {what}",
-            remedy=f"Say {given.spelling} {max(least or 0, 1)}.",
-        )
-    return float(value) if given.kind is float and isinstance(value, Real) else value
+    return float(value) if given.kind is float else value
 
 
 def checked_argument(name: str, kind: object, value: object) -> object:
     """The value of what is no option of a record; see `checked_value`."""
     return checked_value(Option("", names=(name,), kind=kind), value)
+
+
+def _check_number(given: Option, value: object) -> None:
+    """Raise `UsageError` for what is no whole number, or one below the option's least."""
+    least = given.least
+    if type(value) is not int or (least is not None and value < least):
+        what = "a whole number" if least is None else f"{least} or more"
+        raise UsageError(
+            f"{given.spelling} {value}: expected {what}",
+            remedy=f"Say {given.spelling} {max(least or 0, 1)}.",
+        )
 
 
 def _check_kind(given: Option, value: object) -> None:
@@ -250,28 +261,37 @@ def _is_union(kind: object) -> bool:
 
 
 def _is_of(kind: Any, value: object) -> bool:
-    """Whether a value is of a kind; of one in quotes, which is not imported, by its name.
-
-    Other collections stand for sequences: a set of names, say.
-    """
+    """Whether a value is of a kind; of one in quotes, which is not imported, by its name."""
     if isinstance(kind, ForwardRef):
-        own = (each for each in type(value).__mro__ if each.__module__.partition(".")[0] in _OURS)
-        return any(each.__name__ == kind.__forward_arg__ for each in own)
+        return kind.__forward_arg__ in _our_classes(value)
     if _is_union(kind):
         return any(_is_of(each, value) for each in get_args(kind))
-    if kind is Any:
-        return True
-    of, parts = get_origin(kind) or kind, get_args(kind)
-    of = {float: Real, Sequence: Collection}.get(of, of)
-    is_other = of in (Collection, Iterable) and isinstance(value, str | bytes | Mapping)
-    if not isinstance(value, of) or isinstance(value, bool) or is_other:
-        return False
-    if isinstance(value, int) and of is Real:
+    of = {float: Real}.get(kind, get_origin(kind) or kind)
+    if of in (Sequence, Iterable, Mapping, tuple):
+        return _is_collection_of(of, get_args(kind), value)
+    if kind is Any or isinstance(value, bool):  # which Python takes for a number
+        return kind is Any
+    if of is Real and isinstance(value, int):
         return abs(value) <= sys.float_info.max
-    if isinstance(value, Mapping) and parts:
-        return all(all(map(_is_of, parts, entry)) for entry in value.items())
-    if not parts or not isinstance(value, Collection):
-        return True
+    return isinstance(value, of)
+
+
+def _our_classes(value: object) -> list[str]:
+    """The names of our classes that a value is of."""
+    classes = type(value).__mro__
+    return [each.__name__ for each in classes if each.__module__.partition(".")[0] in _OURS]
+
+
+def _is_collection_of(of: Any, parts: tuple[Any, ...], value: Any) -> bool:
+    """Whether a value is a sequence, mapping or tuple, and what is in it is of the given kinds.
+
+    Other collections stand for sequences: a set of names, say; a text does not.
+    """
+    if isinstance(value, Mapping):
+        return of is Mapping and all(all(map(_is_of, parts, entry)) for entry in value.items())
+    of = {Sequence: Collection}.get(of, of)
+    if isinstance(value, str | bytes) or not isinstance(value, of):
+        return False
     if of is tuple and Ellipsis not in parts:
         return len(parts) == len(value) and all(map(_is_of, parts, value))
     return all(_is_of(parts[0], each) for each in value)
