@@ -105,9 +105,11 @@ def _finish(
     own = {head.name.text: len(head.parameters) for head in heads}
     names = replace(names, actions={**actions, **own})
     schemas = tuple(_read_schema(names, head) for head in heads)
-    _check_parts(schemas, heads)
+    is_joint_action = any(schema.parts for schema in schemas)
+    if is_joint_action:
+        _check_parts(schemas, heads)
     constraints, dependences = _read_network(names, schemas, sections)
-    if constraints and any(schema.parts for schema in schemas):
+    if constraints and is_joint_action:
         raise sections[":concurrency-constraint"][0].fail(
             "a concurrency network in a joint-action domain",
             "A joint action already says what every robot does.",
@@ -242,15 +244,18 @@ def _read_heads(names: Names, root: Group, sections: Sections) -> list[_Head]:
 
 def _read_head(names: Names, item: Group) -> _Head:
     name, fields = _fields(item, _FIELDS, _FORM)
-    items, agent_name, clause = _parameter_items(fields)
-    parameters = names.variables_of(items)
-    agent = next((i for i, v in enumerate(parameters) if v.name == agent_name), None)
-    if agent_name is not None and agent is None:
-        found = f", found {echoed(agent_name)}" if agent_name else ""
+    lists, clause = _parameter_lists(fields)
+    parameters = names.variables_of(*lists)
+    if clause is None:
+        return _Head(item, name, fields, parameters, None)
+    first = first_text(clause)
+    agent = next((i for i, v in enumerate(parameters) if v.name == first), None)
+    if agent is None:
+        found = f", found {echoed(first)}" if first else ""
         raise item.fail(f"expected a variable after ':agent'{found}", _AGENT_FORM)
-    if clause:
+    if clause not in lists:
         (own,) = names.variables_of(clause)
-        parameters = tuple(_one(clause[0], own, p) if p.name == own.name else p for p in parameters)
+        parameters = tuple(_one(clause[0], own, p) if p.name == first else p for p in parameters)
     return _Head(item, name, fields, parameters, agent)
 
 
@@ -264,42 +269,38 @@ def _one(place: Expression, own: Variable, listed: Variable) -> Variable:
     return replace(own, types=given[0]) if given else own
 
 
-def _parameter_items(
-    fields: dict[str, tuple[Expression, ...]],
-) -> tuple[tuple[Expression, ...], str | None, tuple[Expression, ...]]:
-    """The full typed list of parameters, the agent's name ("" if it has none), and its clause.
+_Items = tuple[Expression, ...]
 
-    The agent comes first unless it stands among the parameters: only then there is a clause.
+
+def _parameter_lists(fields: Mapping[str, _Items]) -> tuple[list[_Items], _Items | None]:
+    """The typed lists of the parameters, and the one that begins with the agent (None: no agent).
+
+    The agent comes first, unless it stands among the parameters.
     """
-    listed: tuple[Expression, ...] = ()
+    listed: _Items = ()
     if fields.get(":parameters"):
         listed = fields[":parameters"][0].group("a list of parameters").items
-    inside = next((n for n, item in enumerate(listed) if is_token(item, ":agent")), None)
-    if inside is not None:
-        before, behind = listed[:inside], listed[inside + 1 :]
-        if before and not any(is_token(item, "-") for item in before[-2:]):
-            before = _untyped(before)
-        return before + behind, first_text(behind), ()
+    for at, item in enumerate(listed):
+        if is_token(item, ":agent"):
+            return [listed[:at], listed[at + 1 :]], listed[at + 1 :]
+    clause = _agent_clause(fields)
+    if clause is None:
+        return [listed], None
+    is_listed = len(clause) in (1, 3) and any(is_token(i, first_text(clause)) for i in listed)
+    return [listed] if is_listed else [clause, listed], clause
+
+
+def _agent_clause(fields: Mapping[str, _Items]) -> _Items | None:
+    """What stands behind the keyword ``:agent``, perhaps in parentheses; None without it."""
     if ":agent" not in fields:
-        return listed, None, ()
+        return None
     clause = fields[":agent"]
-    if len(clause) == 1 and isinstance(clause[0], Group):  # ":agent (?a - robot)"
+    if len(clause) == 1 and isinstance(clause[0], Group):
         clause = clause[0].items
-    name = first_text(clause)
-    if len(clause) == 1:
-        clause = _untyped(clause)
-    if clause and not is_token(clause[1], "-"):
+    if len(clause) > 1 and not is_token(clause[1], "-"):
         what = "expected '- TYPE' or nothing after the agent's variable"
         raise clause[1].fail(what, _AGENT_FORM)
-    if len(clause) == 3 and any(is_token(item, name) for item in listed):
-        return listed, name, clause
-    return clause + listed, name, ()
-
-
-def _untyped(items: tuple[Expression, ...]) -> tuple[Expression, ...]:
-    """A typed list whose last names must not take the type of what stands behind them."""
-    at, source = items[-1].offset, items[-1].source
-    return (*items, Token("-", at, source), Token("object", at, source))
+    return clause
 
 
 def _read_schema(names: Names, head: _Head) -> Schema:
@@ -345,8 +346,6 @@ def _check_parts(schemas: Sequence[Schema], heads: Sequence[_Head]) -> None:
 
     Such as comments outside of actions: they would be silently ignored.
     """
-    if not any(schema.parts for schema in schemas):
-        return
     read = {comment.offset for head in heads for comment in head.item.comments}
     for comment in subaction_comments(heads[0].item.source):
         if comment.offset not in read:
@@ -394,22 +393,24 @@ def _read_network(
         if by_name.setdefault(constraint.name, constraint) is not constraint:
             what = f"constraint {echoed(constraint.name)} is declared twice"
             raise section.fail(what, "Rename or remove one of them, or list all :actions in one.")
-    dependences = []
-    for section in sections.get(":positive-dependence", ()):
-        pair = [item.token("the name of a constraint") for item in section.items[1:]]
-        if len(pair) != 2:
-            remedy = "V and W are constraints: whoever matches W needs somebody who matches V."
-            raise section.fail("expected '(:positive-dependence V W)'", remedy)
-        for item in pair:
-            if item.text not in by_name:
-                remedy = known(by_name, item.text, "constraint")
-                raise item.fail(f"unknown constraint {echoed(item.text)}", remedy)
-        first, second = (by_name[item.text] for item in pair)
-        if len(first.parameters) != len(second.parameters):
-            remedy = "They are bound to the same objects: give both as many :parameters."
-            raise section.fail("the two constraints have different numbers of parameters", remedy)
-        dependences.append((first.name, second.name))
+    dependences = (_dependence(by_name, s) for s in sections.get(":positive-dependence", ()))
     return tuple(by_name.values()), tuple(dependences)
+
+
+def _dependence(by_name: Mapping[str, Constraint], section: Group) -> tuple[str, str]:
+    pair = [item.token("the name of a constraint") for item in section.items[1:]]
+    if len(pair) != 2:
+        remedy = "V and W are constraints: whoever matches W needs somebody who matches V."
+        raise section.fail("expected '(:positive-dependence V W)'", remedy)
+    for item in pair:
+        if item.text not in by_name:
+            remedy = known(by_name, item.text, "constraint")
+            raise item.fail(f"unknown constraint {echoed(item.text)}", remedy)
+    first, second = (by_name[item.text] for item in pair)
+    if len(first.parameters) != len(second.parameters):
+        remedy = "They are bound to the same objects: give both as many :parameters."
+        raise section.fail("the two constraints have different numbers of parameters", remedy)
+    return first.name, second.name
 
 
 def _constraint(names: Names, schemas: Mapping[str, Schema], section: Group) -> Constraint:
@@ -420,28 +421,36 @@ def _constraint(names: Names, schemas: Mapping[str, Schema], section: Group) -> 
     listed, bounds, actions = (fields[key][0] for key in _NETWORK_FIELDS)
     parameters = names.read_variables(listed)
     low, high = _bounds(bounds.group("'(LOW HIGH)'"))
+    constraint = Constraint(name.text, parameters, low, high, ())
     bound = []
     for item in actions.group("a list of actions").items:
         entry = item.group("'(action POSITION ..)'")
         if entry.head not in schemas:
             raise unknown("action", entry, schemas)
-        own = schemas[entry.head].parameters
-        positions = tuple(map(_number, entry.items[1:]))
-        if len(positions) != len(parameters) or any(p >= len(own) for p in positions):
-            raise entry.fail(
-                f"expected {len(parameters)} argument positions below {len(own)}",
-                f"Each says which argument a parameter of the constraint is. {_FROM_0}",
+        bound.append((entry.head, _positions(names, constraint, schemas[entry.head], entry)))
+    return replace(constraint, actions=tuple(bound))
+
+
+def _positions(
+    names: Names, constraint: Constraint, schema: Schema, entry: Group
+) -> tuple[int, ...]:
+    """Which argument of an action each parameter of a constraint is."""
+    parameters, own = constraint.parameters, schema.parameters
+    positions = tuple(map(_number, entry.items[1:]))
+    if len(positions) != len(parameters) or any(p >= len(own) for p in positions):
+        raise entry.fail(
+            f"expected {len(parameters)} argument positions below {len(own)}",
+            f"Each says which argument a parameter of the constraint is. {_FROM_0}",
+        )
+    for parameter, position in zip(parameters, positions, strict=True):
+        if not have_common(names.types, parameter.types, own[position].types):
+            here, there = (
+                f"{one.name} - {' or '.join(one.types)}" for one in (own[position], parameter)
             )
-        for parameter, position in zip(parameters, positions, strict=True):
-            if not have_common(names.types, parameter.types, own[position].types):
-                here, there = (
-                    f"{one.name} - {' or '.join(one.types)}" for one in (own[position], parameter)
-                )
-                what = f"argument {position} of {entry.head} is {here}, which is never {there}"
-                what += f": the constraint {echoed(name.text)} would never match"
-                raise entry.fail(what, _FROM_0)
-        bound.append((entry.head, positions))
-    return Constraint(name.text, parameters, low, high, tuple(bound))
+            what = f"argument {position} of {entry.head} is {here}, which is never {there}"
+            what += f": the constraint {echoed(constraint.name)} would never match"
+            raise entry.fail(what, _FROM_0)
+    return positions
 
 
 def _bounds(item: Group) -> tuple[int, int | None]:

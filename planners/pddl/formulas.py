@@ -42,10 +42,10 @@ def read_formula(names: Names, item: Expression) -> Formula:
     item = item.group("a formula in parentheses")
     if len(item) == 0:
         return TRUE
-    head = item.items[0].token("a predicate, 'and', 'or', 'not', ..").text
-    if not names.is_word(item):
-        return _literal(names, item)
-    match head:
+    item.items[0].token("a predicate, 'and', 'or', 'not', ..")
+    match names.word(item):
+        case "":
+            return _literal(names, item)
         case "and":
             return And(_parts(names, item))
         case "or":
@@ -55,7 +55,7 @@ def read_formula(names: Names, item: Expression) -> Formula:
         case "imply":
             condition, conclusion = _parts(names, item, 2)
             return Or((Not(condition), conclusion))
-        case "forall" | "exists":
+        case "forall" | "exists" as head:
             _expect(item, 2)
             variables = names.read_variables(item.items[1])
             part = read_formula(names.with_variables(variables), item.items[2])
@@ -111,18 +111,11 @@ def _effects(
     item = item.group("an effect in parentheses")
     if len(item) == 0:
         return
-    head = item.items[0].token("a predicate, 'and', 'not', 'when', ..").text
-    if head in names.predicates and not names.is_word(item):
-        yield Effect(_atom(names, item), True, condition, variables)
-        return
-    match head:
+    item.items[0].token("a predicate, 'and', 'not', 'when', ..")
+    match names.word(item):
         case "and":
             for part in item.items[1:]:
                 yield from _effects(names, part, variables, condition)
-        case "not":
-            _expect(item, 1)
-            atom = _atom(names, item.items[1].group("an atom in parentheses"))
-            yield Effect(atom, False, condition, variables)
         case "when":
             _expect(item, 2)
             own = read_formula(names, item.items[1])
@@ -135,9 +128,13 @@ def _effects(
             names = names.with_variables(inner)
             yield from _effects(names, item.items[2], variables + inner, condition)
         case "increase":
-            yield _cost(names, item, bool(variables) or condition != TRUE)
+            yield _cost(names, item, variables, condition)
+        case "not":
+            _expect(item, 1)
+            atom = _atom(names, item.items[1].group("an atom in parentheses"))
+            yield Effect(atom, False, condition, variables)
         case _:
-            raise unknown("predicate", item, names.predicates)
+            yield Effect(_atom(names, item), True, condition, variables)
 
 
 def _without_shadows(names: Names, item: Group) -> Group:
@@ -158,13 +155,19 @@ def _texts(item: Expression) -> Iterator[str]:
         yield item.text
 
 
-def _cost(names: Names, item: Group, is_conditional: bool) -> int | Atom:
+def _cost(
+    names: Names, item: Group, variables: tuple[Variable, ...], condition: Formula
+) -> int | Atom:
     """What an action costs; all other effects on numbers are refused."""
     target = item.items[1] if len(item) == 3 else None
     if not isinstance(target, Group) or target.head != "total-cost":
         raise unknown("predicate", item, names.predicates)
-    if is_conditional:
+    if variables or condition != TRUE:
         raise item.unsupported("a cost that depends on a condition is")
+    return _amount(names, item)
+
+
+def _amount(names: Names, item: Group) -> int | Atom:
     amount = item.items[2]
     if isinstance(amount, Group):
         if amount.head in ("+", "-", "*", "/"):

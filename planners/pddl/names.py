@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from string import ascii_lowercase
 
 from planners.pddl.lifted import Atom, Domain, Signatures, Variable, have_common
@@ -117,12 +118,12 @@ class Names:
         """What a text about a domain may speak of, without objects."""
         return cls(domain.types, domain.predicates, domain.functions)
 
-    def is_word(self, item: Group) -> bool:
-        """Whether a list begins with a word of PDDL: in ``(or ?x)`` it may name a predicate."""
-        if item.head not in _WORDS or item.head == "=":
-            return item.head in _WORDS
-        declared = *self.predicates.get(item.head, ()), self.actions.get(item.head)
-        return len(item) - 1 not in declared or any(isinstance(i, Group) for i in item.items)
+    def word(self, item: Group) -> str:
+        """The word of PDDL that a list begins with, if any; ``(or ?x)`` may be an atom."""
+        head, is_flat = item.head, not any(isinstance(part, Group) for part in item.items)
+        declared = *self.predicates.get(head, ()), self.actions.get(head)
+        is_name = head != "=" and len(item) - 1 in declared and is_flat
+        return head if head in _WORDS and not is_name else ""
 
     def with_variables(self, variables: Iterable[Variable]) -> Names:
         """The same names with more variables in scope; a variable of the same name is shadowed."""
@@ -133,10 +134,10 @@ class Names:
         """The variables of a typed list in parentheses."""
         return self.variables_of(listed.group("a list of variables").items)
 
-    def variables_of(self, items: Sequence[Expression]) -> tuple[Variable, ...]:
-        """The variables of a typed list; their types must be declared."""
+    def variables_of(self, *lists: Sequence[Expression]) -> tuple[Variable, ...]:
+        """The variables of typed lists; their types must be declared."""
         variables: dict[str, Variable] = {}
-        for token, types in typed_list(items, "a variable"):
+        for token, types in chain(*(typed_list(items, "a variable") for items in lists)):
             name = token.text
             if not name.startswith("?"):
                 remedy = f"Variables start with '?': ?{name}."

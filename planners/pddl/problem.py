@@ -51,9 +51,9 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
 def _read_goal(names: Names, root: Group, sections: Sections) -> Formula:
     goals = sections.get(":goal", [])
     if len(goals) != 1 or len(goals[0]) != 2:
-        found = "found none" if not goals else "this one has no formula, or several"
-        if len(goals) > 1:
-            found = f"found {len(goals)}"
+        found = f"found {len(goals) or 'none'}"
+        if len(goals) == 1:
+            found = "this one has no formula, or several"
         raise (goals[-1] if goals else root).fail(
             f"expected one '(:goal FORMULA)', {found}",
             "Write (:goal (and ..)) with all that must hold at the end, once; (:goal (and)) asks "
@@ -63,20 +63,14 @@ def _read_goal(names: Names, root: Group, sections: Sections) -> Formula:
 
 
 def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, float]) -> None:
-    is_word = names.is_word(item)
-    if is_word and item.head == "and":
+    word = names.word(item)
+    if word == "and":
         for part in item.items[1:]:
             _read_init(names, part.group("an atom in parentheses"), init, values)
-    elif is_word and item.head == "not" and len(item) == 2:
+    elif word == "not" and len(item) == 2:
         read_formula(names, item.items[1])  # closed world: checked, and nothing to add
-    elif item.head == "=" and len(item) == 3 and isinstance(item.items[1], Group):
-        number = item.items[2]
-        function = names.function(item.items[1])
-        if not isinstance(number, Token) or not NUMBER.match(number.text):
-            what, remedy = "a function value that is no number is", "As in (= (distance a b) 3)."
-            raise item.unsupported(what, remedy)
-        if values.setdefault(function, float(number.text)) != float(number.text):
-            raise item.fail("this function has another value already", "Leave one of the two.")
+    elif word == "=" and len(item) == 3 and isinstance(item.items[1], Group):
+        _read_value(names, item, item.items[1], values)
     else:
         _refuse_other_states(item)
         atom = read_formula(names, item)
@@ -84,6 +78,15 @@ def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, fl
             remedy = "As in (at r1 a): what is not listed is false."
             raise item.fail("expected an atom in the initial state", remedy)
         init.add(atom)
+
+
+def _read_value(names: Names, item: Group, term: Group, values: dict[Atom, float]) -> None:
+    function, number = names.function(term), item.items[2]
+    if not isinstance(number, Token) or not NUMBER.match(number.text):
+        what, remedy = "a function value that is no number is", "As in (= (distance a b) 3)."
+        raise item.unsupported(what, remedy)
+    if values.setdefault(function, float(number.text)) != float(number.text):
+        raise item.fail("this function has another value already", "Leave one of the two.")
 
 
 def _refuse_other_states(item: Group) -> None:

@@ -225,33 +225,30 @@ def parse(source: Source) -> Group:
     `planners.system.messages.UNSEEN`, or two names that Unicode makes one.
     """
     _require_plain_names(source)
-    top: Group | None = None
-    lists: list[_Open] = []
+    lists: list[_Open] = [(0, [], [])]  # the first one is the file
     for match in _TOKEN.finditer(source.text):
         text, offset = match[0], match.start()
         if text[0] == ";":
             said = text.lstrip(";").strip().lower()
-            if len(lists) > 1 and said.split()[:1] == [SUBACTION]:
-                lists[1][2].append(Token(said, offset, source))
-        elif wrong := _misplaced(source, text, offset, lists, top):
-            raise wrong
-        elif text == "(":
-            lists.append((offset, [], []))
-        elif text == ")":
+            if len(lists) > 2 and said.split()[:1] == [SUBACTION]:
+                lists[2][2].append(Token(said, offset, source))
+        elif text == ")" and len(lists) > 1:
             start, items, comments = lists.pop()
-            group = Group(tuple(items), start, source, tuple(comments))
-            if lists:
-                lists[-1][1].append(group)
-            else:
-                top = group
+            lists[-1][1].append(Group(tuple(items), start, source, tuple(comments)))
         else:
-            lists[-1][1].append(Token(text.lower(), offset, source))
-    if lists:
-        raise _unclosed(source, lists)
-    if top is None:
+            here = Token(text, offset, source)
+            _require_place(here, lists)
+            if text == "(":
+                lists.append((offset, [], []))
+            else:
+                lists[-1][1].append(Token(text.lower(), offset, source))
+    if len(lists) > 1:
+        raise _unclosed(source, lists[1:])
+    top = lists[0][1]
+    if not top:
         what = "expected '(define ...', found an empty file"
         raise BadInput(what, position=Position(source.name), remedy=_NO_PDDL)
-    return top
+    return top[0].group("a list")
 
 
 def subaction_comments(source: Source) -> Iterator[Token]:
@@ -281,33 +278,28 @@ def _require_plain_names(source: Source) -> None:
             raise Token(name, offset, source).fail(what, "Give one of them another name.")
 
 
-def _misplaced(
-    source: Source, text: str, offset: int, lists: Sequence[_Open], top: Group | None
-) -> BadInput | None:
-    """The error for a token that cannot stand in the lists that are open."""
-    if top is None and lists and len(lists) < MAX_DEPTH and text.lower() not in _SECTIONS:
-        return None
-    here = Token(text, offset, source)
-    if top is not None:
-        remedy = "Expected the end of the file: a parenthesis too many before this position?"
-        return here.fail(f"unexpected {echoed(text)} after the end of the definition", remedy)
-    if text == "(":
+def _require_place(here: Token, lists: Sequence[_Open]) -> None:
+    """Raise `BadInput` for a token that cannot stand in the lists that are open."""
+    text, (start, items, _) = here.text, lists[-1]
+    if len(lists) == 1:
+        if items:
+            remedy = "Expected the end of the file: a parenthesis too many before this position?"
+            raise here.fail(f"unexpected {echoed(text)} after the end of the definition", remedy)
+        if text == ")":
+            remedy = "Remove it, or add the '(' that is missing before it."
+            raise here.fail("')' without a '('", remedy)
+        if text != "(":
+            raise here.fail(f"expected '(define ...', found {echoed(text)}", _NO_PDDL)
+    if text == "(" and len(lists) > MAX_DEPTH:
         remedy = "Is a ')' missing? No domain needs such nesting."
-        too_deep = len(lists) >= MAX_DEPTH
-        return here.fail(f"nested more than {MAX_DEPTH} deep", remedy) if too_deep else None
-    if not lists and text == ")":
-        remedy = "Remove it, or add the '(' that is missing before it."
-        return here.fail("')' without a '('", remedy)
-    if not lists:
-        return here.fail(f"expected '(define ...', found {echoed(text)}", _NO_PDDL)
-    if text.lower() in _SECTIONS and len(lists) > 2 and not lists[-1][1]:
-        start, items, _ = lists[1]
-        return replace(here, offset=lists[-1][0]).fail(
+        raise here.fail(f"nested more than {MAX_DEPTH} deep", remedy)
+    if text.lower() in _SECTIONS and len(lists) > 3 and not items:
+        opened, outer, _ = lists[2]
+        raise replace(here, offset=start).fail(
             f"{text.lower()!r} begins inside of another list: a ')' is missing before it",
-            f"'({first_text(items)}' opens at {source.position(start)} and is not closed: "
-            f"add {len(lists) - 2} ')' before this position.",
+            f"'({first_text(outer)}' opens at {here.source.position(opened)} and is not closed: "
+            f"add {len(lists) - 3} ')' before this position.",
         )
-    return None
 
 
 def _unclosed(source: Source, lists: Sequence[_Open]) -> BadInput:
