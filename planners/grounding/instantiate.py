@@ -381,25 +381,31 @@ class _Grounder:
         Instances with a precondition that is false in every state are none.  Of arguments that
         matter neither for that nor for the owner and the cost only the first is taken.
         """
-        precondition = schema.precondition
-        leaves = [leaf for leaf, _ in literals(precondition)]
-        named = _terms(a for a in leaves if getattr(a, "predicate", "") not in self._fluents)
-        named |= {*schema.cost.args} if isinstance(schema.cost, Atom) else set()
-        every = [(p, self._bindings.objects(p.types)) for p in schema.parameters]
-        if not all(own for _, own in every):
+        objects = {p.name: self._bindings.objects(p.types) for p in schema.parameters}
+        if not all(objects.values()):
             return
-        robots = self._team.robots
-        varied = [p for p, own in every if p.name in named or not {*own}.isdisjoint(robots)]
-        first = {p.name: next(iter(own)) for p, own in every}
-        guards = self._static_atoms(precondition)
-        for binding in self._bindings.values(tuple(varied), first, guards):
+        first = {name: next(iter(own)) for name, own in objects.items()}
+        guards = self._static_atoms(schema.precondition)
+        for binding in self._bindings.values(self._deciding(schema), first, guards):
             owners = self._team.owners(schema, tuple(binding[p.name] for p in schema.parameters))
-            possible = self.formula(precondition, binding, True, owners) != FALSE
-            if len(owners) != 1 or not possible:
-                continue
             cost = schema.cost
-            if not isinstance(cost, Atom) or _bound(cost, binding) in self._problem.values:
+            is_given = not isinstance(cost, Atom) or _bound(cost, binding) in self._problem.values
+            possible = self.formula(schema.precondition, binding, True, owners) != FALSE
+            if len(owners) == 1 and possible and is_given:
                 yield owners[0], self._cost(schema, binding)
+
+    def _deciding(self, schema: Schema) -> tuple[Variable, ...]:
+        """The parameters that decide whether an instance is possible, its owner and its cost."""
+        literal = (leaf for leaf, _ in literals(schema.precondition))
+        named = _terms(a for a in literal if getattr(a, "predicate", "") not in self._fluents)
+        if isinstance(schema.cost, Atom):
+            named |= {*schema.cost.args}
+        robots = set(self._team.robots)
+        return tuple(
+            p
+            for p in schema.parameters
+            if p.name in named or not robots.isdisjoint(self._bindings.objects(p.types))
+        )
 
     def _cost(self, schema: Schema, binding: Binding) -> int:
         if schema.cost is None or isinstance(schema.cost, int):
