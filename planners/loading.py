@@ -101,20 +101,15 @@ def _joint_model(
 
     ``starts`` are the true atoms of all initial states: what can ever be true depends on them.
     """
-    robots, slack = team.robots, options.slack
+    robots = team.robots
     subactions = [[a for a in actions if robot in a.owners] for robot in range(len(robots))]
-    labels = tuple((IDLE, *(action.label for action in own)) for own in subactions)
-    if domain.is_joint_action:
-        labels = _labels_of_parts(actions, robots)
-    seen = options.words_see_slack
-    left = [Atom(SLACK_LEFT, (str(k),)) for k in range(slack + 1)] if seen else []
-    possible = starts | {e.atom for action in actions for e in action.effects if e.adds}
-    fluents = fluent_predicates(domain)
-    facts = FactTable.of([*(atom for atom in possible if atom.predicate in fluents), *left])
+    labels = _labels(subactions, is_joint_action=domain.is_joint_action)
+    possible = starts | _added(actions)
+    fluents, slack = fluent_predicates(domain), _slack_atoms(options)
+    facts = FactTable.of([*(atom for atom in possible if atom.predicate in fluents), *slack])
     codec = StateCodec(facts, robots, labels if options.remember_actions else None)
-    evaluator = Evaluator(codec.facts, {} if domain.is_joint_action else _step_atoms(subactions))
-    costs = options.cost == "makespan+cost"
-    idling = idling_costs(domain, problem, team, costs=costs)
+    evaluator = Evaluator(facts, _step_atoms(subactions))
+    idling = idling_costs(domain, problem, team, costs=options.cost == "makespan+cost")
     stepper: Stepper
     if domain.is_joint_action:
         positions = {s.name: s.position for s in domain.schemas}
@@ -134,23 +129,38 @@ def _joint_model(
         idling_costs=idling,
         statics=static_atoms(domain, problem),
         is_joint_action=domain.is_joint_action,
-        slack=slack,
-        slack_facts=tuple(facts.index[atom] for atom in left),
+        slack=options.slack,
+        slack_facts=tuple(map(facts.index.__getitem__, slack)),
         is_asynchronous=options.asynchronous,
         impossible=impossible_actions(domain, problem, team, actions, possible),
     )
 
 
-def _labels_of_parts(
-    actions: Sequence[GroundAction], robots: Sequence[str]
+def _added(actions: Sequence[GroundAction]) -> set[Atom]:
+    return {effect.atom for action in actions for effect in action.effects if effect.adds}
+
+
+def _slack_atoms(options: ModelOptions) -> list[Atom]:
+    """What says how many steps of the slack are left, where words see that."""
+    left = range(options.slack + 1) if options.words_see_slack else ()
+    return [Atom(SLACK_LEFT, (str(k),)) for k in left]
+
+
+def _labels(
+    subactions: Sequence[Sequence[GroundAction]], *, is_joint_action: bool
 ) -> tuple[tuple[str, ...], ...]:
-    """The labels of joint-action PDDL: what the robots' parts are called, in natural order."""
-    parts = [{action.parts[robot] for action in actions} for robot in range(len(robots))]
+    """What the robots' parts are called; those of joint-action PDDL in natural order."""
+    named = [
+        [*filter(None, dict.fromkeys(action.part_of(robot) for action in own))]
+        for robot, own in enumerate(subactions)
+    ]
 
     def by_names(text: str) -> list[object]:
         return [natural(name) for name in text.strip("()").split()]
 
-    return tuple((IDLE, *sorted(filter(None, own), key=by_names)) for own in parts)
+    if is_joint_action:
+        named = [sorted(own, key=by_names) for own in named]
+    return tuple((IDLE, *own) for own in named)
 
 
 def _step_atoms(subactions: Sequence[Sequence[GroundAction]]) -> dict[StepAtom, tuple[int, int]]:
