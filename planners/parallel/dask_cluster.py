@@ -120,14 +120,13 @@ class Cluster:
         are lost in one job, `ClusterFailed` if the scheduler is gone.
         """
         name = f"coordlang-{uuid4().hex}"
-        expected = {package: versions(package) for package in batch.packages}
+        expected = versions(*batch.packages)
         executor = self.client.get_executor(pure=False, retries=0)
         try:
             self._require_workers()
-            for package, ours in expected.items():
-                found = self.client.run(versions, package, on_error="return")
-                for worker, theirs in found.items():
-                    _compare(f"the worker {worker}", package, theirs, ours)
+            found = self.client.run(versions, *batch.packages, on_error="return")
+            for worker, theirs in found.items():
+                _compare(f"the worker {worker}", theirs, expected)
             self.client.register_plugin(_Shared(Packed(batch)), name=name)
             yield [executor.submit(_do, name, expected, job) for job in jobs]
         except KilledWorker:
@@ -193,27 +192,26 @@ def _address_in(file: str) -> str:
 
 
 @cache
-def versions(package: str) -> tuple[str, ...]:
-    """What the results of a package's code depend on, in this process."""
-    __import__(package)
+def versions(*packages: str) -> list[tuple[str, str]]:
+    """What the results of the packages' code depend on, by package, in this process."""
     python = ".".join(platform.python_version_tuple()[:2])
-    return (
-        f"Python {python}",
-        f"numpy {version('numpy')}",
-        f"scipy {version('scipy')}",
-        f"the code {code_hash(package)[:12]}",
-    )
+    needed = f"Python {python}", f"numpy {version('numpy')}", f"scipy {version('scipy')}"
+    found = []
+    for package in packages:
+        __import__(package)
+        found += [(package, one) for one in (*needed, f"the code {code_hash(package)[:12]}")]
+    return found
 
 
 def _compare(
-    who: str, package: str, theirs: tuple[str, ...] | Exception, ours: Sequence[str]
+    who: str, theirs: list[tuple[str, str]] | Exception, ours: Sequence[tuple[str, str]]
 ) -> None:
     """Refuse other versions; an error is that of a worker that has none."""
     if isinstance(theirs, OSError):  # it has just been lost
         return
     if isinstance(theirs, Exception):
         raise _other_version(who, theirs)
-    for its, wanted in zip(theirs, ours, strict=True):
+    for (package, its), (_, wanted) in zip(theirs, ours, strict=True):
         if its != wanted:
             raise _other_version(who, f"{package} has {its} there, {wanted} here")
 
@@ -234,9 +232,9 @@ class _Shared(distributed.WorkerPlugin):  # type: ignore[misc]
         self.work = work
 
 
-def _do(name: str, expected: dict[str, tuple[str, ...]], job: Any) -> Any:
+def _do(name: str, expected: list[tuple[str, str]], job: Any) -> Any:
     """One job, as a task; see `planners.parallel.batch.Packed.attempt`."""
     worker = distributed.get_worker()
-    for package, wanted in expected.items():
-        _compare(f"the worker {worker.address}", package, versions(package), wanted)
+    found = versions(*dict(expected))
+    _compare(f"the worker {worker.address}", found, expected)
     return worker.plugins[name].work.attempt(job)

@@ -49,35 +49,51 @@ class Workers:
 
         Raises `OutOfMemory` for a job whose workers are lost, `UsageError` if none can be started.
         """
-        kept = self.kept
-        keys = [] if kept is None else batch.keys()
-        tables = ((number, kept.read(key)) for number, key in enumerate(keys) if kept)
-        ready: dict[int, Outcome] = {n: table for n, table in tables if table is not None}
-        left = [number for number in range(len(batch.jobs)) if number not in ready]
-        with closing(self._done(batch, left)) as done:
-            for number in range(len(batch.jobs)):
+        ready: dict[int, Outcome] = {}
+        every = range(len(batch.jobs))
+        outcomes = self._kept(batch, self.kept) if self.kept else self._done(batch, every)
+        with closing(outcomes):
+            for number in every:
                 while number not in ready:
-                    ended, outcome = next(done)
+                    ended, outcome = next(outcomes)
                     ready[ended] = outcome
-                    if kept is not None and isinstance(outcome, dict):
-                        kept.write(keys[ended], outcome)
                 outcome = ready.pop(number)
                 if isinstance(outcome, BaseException):
                     raise outcome
                 yield outcome
 
-    def _done(self, batch: Batch, left: list[int]) -> Generator[tuple[int, Outcome]]:
-        """Do the jobs that are left, and those again whose worker was lost.
+    def _kept(self, batch: Batch, kept: Store) -> Generator[tuple[int, Outcome]]:
+        """The outcomes that are kept, then those of the other jobs, which are kept from then on."""
+        keys, left = batch.keys(), []
+        for number, key in enumerate(keys):
+            table = kept.read(key)
+            if table is None:
+                left.append(number)
+            else:
+                yield number, table
+        with closing(self._done(batch, left)) as done:
+            for number, outcome in done:
+                if isinstance(outcome, dict):
+                    kept.write(keys[number], outcome)
+                yield number, outcome
+
+    def _done(self, batch: Batch, left: Sequence[int]) -> Generator[tuple[int, Outcome]]:
+        """Do the jobs that are left, here or elsewhere; each number comes with its outcome."""
+        effort = sum(batch.efforts[number] for number in left)
+        is_small = min(self.processes, len(left)) < 2 or effort < self.worth
+        if self.cluster or not (is_small or _is_daemonic()):
+            yield from self._done_elsewhere(batch, [*left])
+            return
+        for number in left:
+            yield number, batch.function(batch.shared, batch.jobs[number])
+
+    def _done_elsewhere(self, batch: Batch, left: list[int]) -> Generator[tuple[int, Outcome]]:
+        """Have workers do the jobs that are left, and those again whose worker was lost.
 
         All processes are lost with one of them.  Mostly there was no memory for all, so there are
         half as many from then on.
         """
         count, lost = min(self.processes, len(left)), 0
-        effort = sum(batch.efforts[number] for number in left)
-        if not self.cluster and (count < 2 or effort < self.worth or _is_daemonic()):
-            for number in left:
-                yield number, batch.function(batch.shared, batch.jobs[number])
-            return
         while left:
             try:
                 with self._begin(batch, [batch.jobs[n] for n in left], count) as futures:

@@ -95,8 +95,8 @@ def test_work_that_is_stopped_leaves_nothing(
 def test_other_versions_are_refused(connected: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
     from planners.parallel import dask_cluster
 
-    ours = ("Python 2.7", *dask_cluster.versions("planners")[1:])
-    monkeypatch.setattr(dask_cluster, "versions", lambda _: ours)
+    ours = [("planners", "Python 2.7"), *dask_cluster.versions("planners")[1:]]
+    monkeypatch.setattr(dask_cluster, "versions", lambda *_: ours)
     with pytest.raises(UsageError, match=r"has Python 3.* there, Python 2.7 here") as caught:
         list(connected.tables(batch(jobs.squares, 1, [range(2)])))
     assert "coordlang[cluster]" in str(caught.value)
