@@ -8,8 +8,10 @@ and all but the required atoms are left out; so what is said of them is true of 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import chain, combinations, islice, product
 from typing import NamedTuple
 
@@ -146,25 +148,19 @@ def apply_network(
     not any ``high`` others. (v, w) dependent: whoever is in w needs somebody in v with the same
     binding, who may be itself.
     """
-    if not domain.constraints:
-        return tuple(actions)
     by_name = {c.name: c for c in domain.constraints}
     dependences = [(by_name[needed], by_name[by]) for needed, by in domain.dependences]
-    types = {variable.types for c in domain.constraints for variable in c.parameters}
-    members = {own: frozenset(objects_of(domain, problem, own)) for own in types}
+    members = cache(lambda types: frozenset(objects_of(domain, problem, types)))
     keys = [[*dict.fromkeys(_keys(domain, members, action))] for action in actions]
-    groups: dict[_Key, list[GroundAction]] = {}
+    groups: defaultdict[_Key, list[GroundAction]] = defaultdict(list)
     for action, own in zip(actions, keys, strict=True):
         for key in own:
-            groups.setdefault(key, []).append(action)
-    return tuple(
-        _bound(dependences, groups, action, own) if own else action
-        for action, own in zip(actions, keys, strict=True)
-    )
+            groups[key].append(action)
+    return tuple(_bound(dependences, groups, *pair) for pair in zip(actions, keys, strict=True))
 
 
 def _keys(
-    domain: Domain, members: Mapping[tuple[str, ...], Set[str]], action: GroundAction
+    domain: Domain, members: Callable[[tuple[str, ...]], Set[str]], action: GroundAction
 ) -> Iterator[_Key]:
     for constraint in domain.constraints:
         for name, positions in constraint.actions:
@@ -172,7 +168,7 @@ def _keys(
                 continue
             binding = tuple(action.args[p] for p in positions)
             pairs = zip(binding, constraint.parameters, strict=True)
-            if all(value in members[variable.types] for value, variable in pairs):
+            if all(value in members(variable.types) for value, variable in pairs):
                 yield constraint, binding
 
 

@@ -63,13 +63,14 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
         )
     with reaching(lambda: f"reading {directory}", "shorter files"):
         read = parse_domains([*map(read_source, domains.values())])
-    views = [
-        _of_robot(robot, domain, read_problem(problems[robot], domain))
-        for robot, domain in zip(domains, read, strict=True)
-    ]
-    domain = _join_domains([domain for domain, _ in views], str(directory))
-    problem = _join_problems([problem for _, problem in views], str(directory))
-    _require_owners(domain, problem, dict(zip(domains, (own for own, _ in views), strict=True)))
+    views: dict[str, Domain] = {}
+    tasks: list[Problem] = []
+    for robot, own in zip(domains, read, strict=True):
+        tasks.append(read_problem(problems[robot], own))
+        views[robot] = _of_robot(robot, own, tasks[-1])
+    domain = _join_domains([*views.values()], str(directory))
+    problem = _join_problems(tasks, str(directory))
+    _require_owners(domain, problem, views)
     return domain, problem
 
 
@@ -90,8 +91,8 @@ def _files(folder: Path, kind: str) -> dict[str, Path]:
     return found
 
 
-def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Problem]:
-    """The robot's view with its own parameter in every action marked as the agent."""
+def _of_robot(robot: str, domain: Domain, problem: Problem) -> Domain:
+    """The robot's domain with its own parameter in every action marked as the agent."""
     if robot not in problem.objects:
         raise BadInput(
             f"robot {echoed(robot)} of the file name is no object of its problem",
@@ -99,7 +100,7 @@ def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Pro
             remedy="A robot's files have its name, and its problem declares it.",
         )
     schemas = tuple(replace(s, agent=_agent(robot, s, domain, problem)) for s in domain.schemas)
-    return replace(domain, schemas=schemas), problem
+    return replace(domain, schemas=schemas)
 
 
 def _agent(robot: str, schema: Schema, domain: Domain, problem: Problem) -> int:

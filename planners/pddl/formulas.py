@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain, count
+from itertools import count
 
 from planners.pddl.lifted import (
     TRUE,
@@ -141,18 +141,10 @@ def _without_shadows(names: Names, item: Group) -> Group:
     """A ``forall`` in which a variable that would shadow an outer one has a name of its own."""
     for name in [variable.name for variable in names.read_variables(item.items[1])]:
         if name in names.variables:
-            taken = {*names.variables, *_texts(item)}
+            taken = "\n".join((*names.variables, item.source.text.lower()))
             fresh = (f"{name}.{n}" for n in count(1))
             item = _rename(item, name, next(new for new in fresh if new not in taken))
     return item
-
-
-def _texts(item: Expression) -> Iterator[str]:
-    """The tokens of a part of a file."""
-    if isinstance(item, Group):
-        yield from chain.from_iterable(map(_texts, item.items))
-    else:
-        yield item.text
 
 
 def _cost(
