@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass
+from multiprocessing import current_process
 from os import PathLike
 from typing import Any
 
@@ -81,7 +82,8 @@ class Workers:
         """Do the jobs that are left, here or elsewhere; each number comes with its outcome."""
         effort = sum(batch.efforts[number] for number in left)
         is_small = min(self.processes, len(left)) < 2 or effort < self.worth
-        if self.cluster or not (is_small or _is_daemonic()):
+        # Workers of `multiprocessing.Pool`, and Dask's, may start no processes.
+        if self.cluster or not (is_small or current_process().daemon):
             yield from self._done_elsewhere(batch, [*left])
             return
         for number in left:
@@ -124,13 +126,6 @@ class Workers:
         left = memory_left()
         count = min(count, max(1, left // _LEAST_MEMORY))
         return in_processes(batch, jobs, count, left // count if has_memory_limit() else None)
-
-
-def _is_daemonic() -> bool:
-    """Whether this process may start no other (workers of `multiprocessing.Pool`, and Dask's)."""
-    from multiprocessing import current_process
-
-    return current_process().daemon
 
 
 def cores() -> int:

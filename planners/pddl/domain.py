@@ -114,17 +114,8 @@ def _finish(
             "a concurrency network in a joint-action domain",
             "A joint action already says what every robot does.",
         )
-    return Domain(
-        name,
-        source,
-        dict(names.types),
-        dict(names.objects),
-        dict(names.predicates),
-        dict(names.functions),
-        schemas,
-        constraints,
-        dependences,
-    )
+    declared = names.types, names.objects, names.predicates, names.functions
+    return Domain(name, source, *declared, schemas, constraints, dependences)
 
 
 def _read_types(root: Group, sections: Sections) -> dict[str, tuple[str, ...]]:

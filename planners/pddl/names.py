@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from string import ascii_lowercase
 
 from planners.pddl.lifted import Atom, Domain, Signatures, Variable, have_common
-from planners.pddl.sexpr import SECTIONS, UNSUPPORTED, Expression, Group, Token
+from planners.pddl.sexpr import SECTIONS, UNSUPPORTED, Expression, Group, Token, first_text
 from planners.system.errors import BadInput, Unsupported, note
 from planners.system.messages import echoed, visible
 
@@ -103,11 +103,11 @@ class Names:
     read is a domain, whose objects are its constants.
     """
 
-    types: Mapping[str, tuple[str, ...]]
+    types: dict[str, tuple[str, ...]]
     predicates: Signatures
     functions: Signatures = field(default_factory=dict)
     actions: Mapping[str, int] = field(default_factory=dict)
-    objects: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    objects: dict[str, tuple[str, ...]] = field(default_factory=dict)
     variables: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     in_domain: bool = False
     #: Whether types have one in common, as far as it was asked.
@@ -225,52 +225,43 @@ def unknown(what: str, item: Group, declared: Iterable[str]) -> BadInput | Unsup
 
 
 def read_objects(
-    names: Names, sections: Iterable[Group], known: Mapping[str, tuple[str, ...]]
+    names: Names, sections: Sequence[Group], known: Mapping[str, tuple[str, ...]]
 ) -> dict[str, tuple[str, ...]]:
     """Objects with their types: those known, and those that sections declare.
 
     A section is a typed list, with ``(:private ..)`` groups.
     """
-    objects = {**known}
-    parts = [_without_private(section) for section in sections]
-    declared = {*known, *(token.text for entries, _ in parts for token, _ in entries)}
-    for entries, private in parts:
-        for group in private:
-            own = typed_list(_without_owner(group, declared), "an object")
-            declared |= {token.text for token, _ in own}
-            entries += own
-        for token, types in entries:
-            names.check_types(token, types)
-            if token.text.startswith("?"):
-                remedy = f"Names of objects have no '?': {visible(token.text[1:_SHOWN])}."
-                raise token.fail("a variable cannot be an object", remedy)
-            objects[token.text] = tuple(dict.fromkeys((*objects.get(token.text, ()), *types)))
+    objects, private = {**known}, list[Group]()
+    for section in sections:
+        own = [i for i in section.items if isinstance(i, Group) and i.head == ":private"]
+        _declare(names, objects, [i for i in section.items[1:] if i not in own])
+        private += own
+    for group in private:
+        _declare(names, objects, _without_owner(group, objects))
     return objects
 
 
-def _without_private(section: Group) -> tuple[list[Typed], list[Group]]:
-    """The objects of a section that are in no ``(:private ..)`` group, and these groups."""
-    items = section.items[1:]
-    private = [item for item in items if isinstance(item, Group) and item.head == ":private"]
-    return typed_list([item for item in items if item not in private], "an object"), private
+def _declare(
+    names: Names, objects: dict[str, tuple[str, ...]], items: Sequence[Expression]
+) -> None:
+    for token, types in typed_list(items, "an object"):
+        names.check_types(token, types)
+        if token.text.startswith("?"):
+            remedy = f"Names of objects have no '?': {visible(token.text[1:_SHOWN])}."
+            raise token.fail("a variable cannot be an object", remedy)
+        objects[token.text] = tuple(dict.fromkeys((*objects.get(token.text, ()), *types)))
 
 
-def _without_owner(section: Group, declared: Set[str]) -> Sequence[Expression]:
+def _without_owner(section: Group, declared: Collection[str]) -> Sequence[Expression]:
     """The objects of a ``(:private ..)`` group, without an owner in front of them.
 
     Unfactored MA-PDDL writes ``(:private depot0 hoist0 - hoist)``: the owner is declared elsewhere,
     or again in the group.  What a type stands behind is no owner.
     """
     inner = section.items[1:]
-    if (
-        not inner
-        or not isinstance(inner[0], Token)
-        or any(is_token(item, "-") for item in inner[1:2])
-    ):
-        return inner
-    owner = inner[0].text
-    repeated = any(is_token(item, owner) for item in inner[1:])
-    return inner[1:] if repeated or owner in declared else inner
+    owner, is_typed = first_text(inner), any(is_token(item, "-") for item in inner[1:2])
+    is_owner = owner in declared or any(is_token(item, owner) for item in inner[1:])
+    return inner[1:] if is_owner and not is_typed else inner
 
 
 #: Keyword -> the sections that it begins, in the order of the file.
