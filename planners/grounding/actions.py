@@ -149,14 +149,16 @@ def apply_network(
     binding, who may be itself.
     """
     by_name = {c.name: c for c in domain.constraints}
-    dependences = [(by_name[needed], by_name[by]) for needed, by in domain.dependences]
+    needed: defaultdict[str, list[Constraint]] = defaultdict(list)
+    for helping, by in domain.dependences:
+        needed[by].append(by_name[helping])
     members = cache(lambda types: frozenset(objects_of(domain, problem, types)))
     keys = [[*dict.fromkeys(_keys(domain, members, action))] for action in actions]
     groups: defaultdict[_Key, list[GroundAction]] = defaultdict(list)
     for action, own in zip(actions, keys, strict=True):
         for key in own:
             groups[key].append(action)
-    return tuple(_bound(dependences, groups, *pair) for pair in zip(actions, keys, strict=True))
+    return tuple(_bound(needed, groups, *pair) for pair in zip(actions, keys, strict=True))
 
 
 def _keys(
@@ -173,8 +175,8 @@ def _keys(
 
 
 def _bound(
-    dependences: Sequence[tuple[Constraint, Constraint]],
-    groups: Mapping[_Key, list[GroundAction]],
+    needed: defaultdict[str, list[Constraint]],
+    groups: defaultdict[_Key, list[GroundAction]],
     action: GroundAction,
     keys: Sequence[_Key],
 ) -> GroundAction:
@@ -187,10 +189,10 @@ def _bound(
             linked += others
         if constraint.high is not None:
             parts += conjuncts(negated(_some(others, constraint.high)))
-        for needed in [needed for needed, by in dependences if by == constraint]:
-            helpers = _by_robot(groups.get((needed, binding), []), action)
+        for helping in needed[constraint.name]:
+            helpers = _by_robot(groups[helping, binding], action)
             linked += helpers
-            if (needed, binding) not in keys:
+            if (helping, binding) not in keys:
                 parts.append(_some(helpers, 1))
     if not parts and not linked:
         return action

@@ -326,19 +326,18 @@ class _Grounder:
         leaves = [leaf for leaf, _ in literals(f)]
         names = tuple(sorted(term for term in _terms(leaves) if term.startswith("?")))
         part = f.part if isinstance(f, Exists) else negated(f.part)
-        changing = {
-            leaf
-            for leaf in leaves
-            if isinstance(leaf, StepAtom)
-            or (isinstance(leaf, Atom) and leaf.predicate in self._fluents)
-        }
+        changing = {leaf for leaf in leaves if not self._is_static(leaf)}
         steps = tuple(p for p in conjuncts(part) if isinstance(p, StepAtom) and {p} == changing)
         found = self._shapes[id(f)] = (f, names, self._static_atoms(part), steps)
         return found
 
     def _static_atoms(self, f: Formula) -> tuple[Atom, ...]:
         """The static atoms among the parts that must all hold."""
-        return tuple(a for a in required_atoms(f) if a.predicate not in self._fluents)
+        return tuple(a for a in required_atoms(f) if self._is_static(a))
+
+    def _is_static(self, leaf: Atom | StepAtom | Equal) -> bool:
+        is_fluent = isinstance(leaf, Atom) and leaf.predicate in self._fluents
+        return not is_fluent and not isinstance(leaf, StepAtom)
 
     def _step_atom(
         self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
