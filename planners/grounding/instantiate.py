@@ -6,7 +6,7 @@ Static atoms, equalities and types are evaluated.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from functools import cache
 from math import prod
@@ -60,20 +60,17 @@ _MANY = 1000
 class Bindings:
     """The objects of a problem, its static facts and its possible subactions.
 
-    ``instances``: action -> the arguments with which it may ever be done; empty if unknown.
+    ``objects`` numbers those of some types in their order.  ``instances``: action -> the arguments
+    with which it may ever be done; empty if unknown.
     """
 
     def __init__(
         self,
-        domain: Domain,
-        problem: Problem,
+        objects: Callable[[tuple[str, ...]], Mapping[str, int]],
         statics: Iterable[Atom],
         instances: Mapping[str, Sequence[Arguments]],
     ) -> None:
-        self._domain = domain
-        self._problem = problem
-        self._instances = instances
-        self._members: dict[tuple[str, ...], dict[str, int]] = {}
+        self.objects, self._instances = objects, instances
         #: The arguments with which a guard is true, by what it is about and their number.
         self._true: dict[tuple[type[Guard], str, int], list[Arguments]] = {}
         for fact in statics:
@@ -132,13 +129,6 @@ class Bindings:
             for args in self._true.get(kind, ()):
                 table.setdefault(tuple(args[n] for n in known), set()).add(args[place])
         return table.get(tuple(values[n] for n in known), frozenset())
-
-    def objects(self, types: tuple[str, ...]) -> dict[str, int]:
-        """The objects of some types, numbered in their order."""
-        if types not in self._members:
-            found = objects_of(self._domain, self._problem, types)
-            self._members[types] = {name: number for number, name in enumerate(found)}
-        return self._members[types]
 
 
 #: What to try when grounding is too much.
@@ -233,7 +223,10 @@ class _Grounder:
         self._fluents = fluent_predicates(domain)
         self._statics = static_atoms(domain, problem)
         self._schemas = {schema.name: schema for schema in domain.schemas}
-        self._bindings = Bindings(domain, problem, self._statics, reachable)
+        objects = cache(
+            lambda types: {o: n for n, o in enumerate(objects_of(domain, problem, types))}
+        )
+        self._bindings = Bindings(objects, self._statics, reachable)
         self._owners_of = cache(self._owners_named)
         #: Ground quantified formulas by the values of variables in them: actions share most.
         self._quantified: dict[tuple[object, ...], Formula] = {}
