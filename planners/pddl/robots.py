@@ -22,16 +22,14 @@ ENVIRONMENT = "environment"
 _MOST_GUESSED = 12
 #: Objects of a type that messages list.
 _SHOWN = 6
-_DIGITS = frozenset("0123456789")
 
 
 def natural(name: str) -> tuple[tuple[int, int, str], ...]:
     """A sort key in which ``r2`` comes before ``r10``."""
-    parts = re.split(r"([0-9]+)", name)
+    parts = enumerate(re.split(r"([0-9]+)", name))  # every second one is a number
     # Numbers compare by their length without leading zeros, then as text: no int() that has limits.
     return tuple(
-        (1, len(p.lstrip("0")), f"{p.lstrip('0')} {p}") if p[:1] in _DIGITS else (0, 0, p)
-        for p in parts
+        (1, len(p.lstrip("0")), f"{p.lstrip('0')} {p}") if n % 2 else (0, 0, p) for n, p in parts
     )
 
 
