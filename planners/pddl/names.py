@@ -279,7 +279,7 @@ def read_header(root: Group, kind: str) -> tuple[str, Sections]:
             f"A {kind} file is one '(define ({kind} NAME) ..)'; give DOMAIN first, then PROBLEM."
         )
         raise root.fail(f"expected '(define ({kind} ..) ..)'", remedy)
-    title = root.items[1] if len(root) > 1 else root
+    title = next(iter(root.items[1:]), root)
     if not isinstance(title, Group) or title.head != kind or len(title) != 2:
         other = title.head if isinstance(title, Group) else ""
         remedy = f"As in (define ({kind} NAME) ..)."

@@ -159,9 +159,9 @@ def _declared(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str] |
     agents = [(s.acting, s.precondition) for s in domain.schemas if s.acting is not None]
     if not agents:
         return None
-    robots = {name for own in agents for name in _possible_agents(domain, problem, *own)}
-    types = sorted({t for agent, _ in agents for t in agent.types})
-    return tuple(sorted(robots, key=natural)), f":agent of type {', '.join(types)}"
+    robots = set[str]().union(*(_possible_agents(domain, problem, *own) for own in agents))
+    types = set[str]().union(*(agent.types for agent, _ in agents))
+    return tuple(sorted(robots, key=natural)), f":agent of type {', '.join(sorted(types))}"
 
 
 def _possible_agents(
