@@ -142,30 +142,29 @@ class Store:
 
     def read(self, key: str) -> Table | None:
         """The table of a key; None if there is none, or none that is whole."""
-        path = self._path(key)
+        path, data, why = self._path(key), b"", "is damaged"
         try:
             found = path.stat()
             if not stat.S_ISREG(found.st_mode):  # a pipe would be waited for
-                self._ignore(path, "is no file")
-                return None
-            data = path.read_bytes() if found.st_size <= self._largest else b""
-            if self.most_bytes is not None:
+                why = "is no file"
+            elif found.st_size <= self._largest:
+                data = path.read_bytes()
                 with suppress(OSError):  # a folder that is only read
                     os.utime(path)  # it was used now
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            self._ignore(path, f"cannot be read ({error.strerror})")
-            return None
+            why = f"cannot be read ({error.strerror})"
         except MemoryError:
-            self._ignore(path, "does not fit into the memory")
-            return None
-        begin, content = data[:32], data[32:]
-        if begin != _hash(key, content):
-            self._ignore(path, "is damaged")
-            return None
-        with np.load(BytesIO(content), allow_pickle=False) as arrays:
-            return dict(arrays)
+            why = "does not fit into the memory"
+        content = data[32:]
+        if data[:32] == _hash(key, content):
+            with np.load(BytesIO(content), allow_pickle=False) as arrays:
+                return dict(arrays)
+        note(f"{path} {why}: it is ignored, and its result is worked out again")
+        with suppress(OSError):  # it is gone already, or the folder is only read
+            path.unlink()
+        return None
 
     def write(self, key: str, table: Table) -> None:
         """Keep a table, if it is not too large; raises `UsageError` where it cannot be written."""
@@ -184,12 +183,6 @@ class Store:
                     raise
         if self.most_bytes is not None:
             self._let_go(self.most_bytes)
-
-    def _ignore(self, path: Path, why: str) -> None:
-        """Say that a file is not used, and remove it."""
-        note(f"{path} {why}: it is ignored, and its result is worked out again")
-        with suppress(OSError):  # it is gone already, or the folder is only read
-            path.unlink()
 
     @property
     def _largest(self) -> int:
