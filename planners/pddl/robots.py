@@ -81,7 +81,7 @@ def find_team(domain: Domain, problem: Problem, choice: ModelOptions) -> Team:
     or type.
     """
     if choice.recorded and choice.unowned == "environment" and ENVIRONMENT not in problem.objects:
-        choice = replace(choice, robots=[name for name in choice.names if name != ENVIRONMENT])
+        choice = replace(choice, robots=sorted({*choice.names} - {ENVIRONMENT}, key=natural))
     robots, by = _found(domain, problem, choice)
     if not robots:
         raise BadInput(

@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import FrameType
 
 from planners.system.errors import CoordlangError, OutOfMemory, OutOfTime
@@ -282,7 +283,7 @@ def address_space_left() -> float:
 def _available() -> int:
     """Bytes that the machine, or the process's control group, has free or can free at once."""
     with suppress(OSError):
-        found = _AVAILABLE.search(_text(_MEMORY_OF_MACHINE))
+        found = _AVAILABLE.search(Path(_MEMORY_OF_MACHINE).read_text())
         if found is not None:
             return min(int(found[1]) * 2**10, _group_memory_left())
     import psutil
@@ -295,32 +296,25 @@ def _group_memory_left() -> int:
     left = sys.maxsize
     for folder in _memory_groups():
         with suppress(OSError, ValueError):  # no group of its own, or one without a limit
-            most, used = (int(_text(f"{folder}/memory.{name}")) for name in ("max", "current"))
+            most, used = (int((folder / f"memory.{n}").read_text()) for n in ("max", "current"))
             # Files in memory are given up where it is short.
-            files = re.search(r"^inactive_file (\d+)", _text(f"{folder}/memory.stat"), re.M)
+            files = re.search(r"^inactive_file (\d+)", (folder / "memory.stat").read_text(), re.M)
             left = min(left, max(0, most - used + (int(files[1]) if files else 0)))
     return left
 
 
-def _memory_groups() -> Iterator[str]:
-    """The folders of the control groups that this process is in."""
+def _memory_groups() -> Iterator[Path]:
+    """The folders of the control groups that this process is in, and those above."""
     with suppress(OSError):
-        own = _text("/proc/self/cgroup").strip().rpartition("0::/")[2]
-        while own:
-            yield f"{_GROUPS}/{own}"
-            own = own.rpartition("/")[0]
-        yield _GROUPS  # in a container ``own`` may be of the machine, and this is the own group
+        own = Path("/proc/self/cgroup").read_text().strip().rpartition("0::/")[2]
+        yield Path(_GROUPS, own)
+        yield from Path(_GROUPS, own).parents  # in a container ``own`` may be of the machine
 
 
 def address_space() -> int:
     """Bytes of address space that this process has."""
     with suppress(OSError):
-        return int(_text(_MEMORY_OF_PROCESS).split()[0]) * resource.getpagesize()
+        return int(Path(_MEMORY_OF_PROCESS).read_text().split()[0]) * resource.getpagesize()
     import psutil
 
     return int(psutil.Process().memory_info().vms)
-
-
-def _text(path: str) -> str:
-    with open(path) as file:
-        return file.read()
