@@ -143,7 +143,8 @@ def _without_shadows(names: Names, item: Group) -> Group:
         if name in names.variables:
             taken = "\n".join((*names.variables, item.source.text.lower()))
             fresh = (f"{name}.{n}" for n in count(1))
-            item = _rename(item, name, next(new for new in fresh if new not in taken))
+            new = next(each for each in fresh if each not in taken)
+            item = _renamed(item, name, new).group("an effect in parentheses")
     return item
 
 
@@ -191,10 +192,7 @@ def _expect(item: Group, count: int) -> None:
         )
 
 
-def _rename(item: Group, old: str, new: str) -> Group:
-    def renamed(part: Expression) -> Expression:
-        if isinstance(part, Group):
-            return _rename(part, old, new)
-        return replace(part, text=new) if part.text == old else part
-
-    return replace(item, items=tuple(map(renamed, item.items)))
+def _renamed(part: Expression, old: str, new: str) -> Expression:
+    if isinstance(part, Group):
+        return replace(part, items=tuple(_renamed(inner, old, new) for inner in part.items))
+    return replace(part, text=new) if part.text == old else part

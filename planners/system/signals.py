@@ -69,13 +69,9 @@ class Postponed:
 
     def __init__(self) -> None:
         self._handlers: dict[int, Callable[[int, FrameType | None], object]] = {}
-        self._arrived: list[int] = []
+        #: The signals that wait.
+        self.arrived: list[int] = []
         self._heard = False
-
-    @property
-    def arrived(self) -> bool:
-        """Whether a signal waits."""
-        return bool(self._arrived)
 
     @contextmanager
     def heard(self) -> Iterator[None]:
@@ -109,14 +105,14 @@ class Postponed:
 
     def _send_again(self) -> None:
         with ExitStack() as all_of_them:  # whatever their handlers raise
-            while self._arrived:
-                all_of_them.callback(signal.raise_signal, self._arrived.pop())
+            while self.arrived:
+                all_of_them.callback(signal.raise_signal, self.arrived.pop())
 
     def _arrive(self, number: int, frame: FrameType | None) -> None:
         if self._heard:
             self._handlers[number](number, frame)
         else:
-            self._arrived.append(number)
+            self.arrived.append(number)
 
 
 @contextmanager
