@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
@@ -128,7 +128,7 @@ def _read_text(domain: Domain, problem: Problem, text: str, position: Position |
                 "expected one PDDL literal", remedy="As in (at r1 a) or (not (at r1 a))."
             )
         root = parse(Source(position.file if position else "task", parts[0]))
-        names = replace(Names.of(domain), functions={}, objects=problem.objects)
+        names = Names(domain.types, domain.predicates, objects=problem.objects)
         return read_formula(names, root)
     except BadInput as error:
         raise BadInput(f"{text}: {error.what}", position=position, remedy=error.remedy) from None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from string import ascii_lowercase
 
-from planners.pddl.lifted import Atom, Domain, Signatures, Variable, have_common
+from planners.pddl.lifted import Atom, Signatures, Variable, have_common
 from planners.pddl.sexpr import SECTIONS, UNSUPPORTED, Expression, Group, Token, first_text
 from planners.system.errors import BadInput, Unsupported, note
 from planners.system.messages import echoed, visible
@@ -112,11 +112,6 @@ class Names:
     in_domain: bool = False
     #: Whether types have one in common, as far as it was asked.
     _common: dict[tuple[Collection[str], Collection[str]], bool] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, domain: Domain) -> Names:
-        """What a text about a domain may speak of, without objects."""
-        return cls(domain.types, domain.predicates, domain.functions)
 
     def word(self, item: Group) -> str:
         """The word of PDDL that a list begins with, if any; ``(or ?x)`` may be an atom."""

@@ -36,7 +36,7 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
                 f"this is a problem for domain {echoed(other)}, not for {echoed(domain.name)}",
                 f"The domain was read from {domain.source.name}.",
             )
-    names = Names.of(domain)
+    names = Names(domain.types, domain.predicates, domain.functions)
     objects = read_objects(names, sections.get(":objects", ()), domain.constants)
     names = replace(names, objects=objects)
     init: set[Atom] = set()
