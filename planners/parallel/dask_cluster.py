@@ -235,6 +235,5 @@ class _Shared(distributed.WorkerPlugin):  # type: ignore[misc]
 def _do(name: str, expected: list[tuple[str, str]], job: Any) -> Any:
     """One job, as a task; see `planners.parallel.batch.Packed.attempt`."""
     worker = distributed.get_worker()
-    found = versions(*dict(expected))
-    _compare(f"the worker {worker.address}", found, expected)
+    _compare(f"the worker {worker.address}", versions(*dict(expected)), expected)
     return worker.plugins[name].work.attempt(job)

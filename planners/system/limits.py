@@ -259,9 +259,8 @@ def load_libraries() -> None:
 
 def lacks_memory(error: BaseException) -> bool:
     """Whether this error, of whatever library, means that the memory is used up."""
-    if isinstance(error, MemoryError):
-        return True
-    if isinstance(error, OSError) and error.errno == errno.ENOMEM:
+    is_refused = isinstance(error, OSError) and error.errno == errno.ENOMEM
+    if is_refused or isinstance(error, MemoryError):
         return True
     # C code that was refused memory and does not say so; without a limit it is a bug.
     if isinstance(error, SystemError) and any(text in str(error) for text in _NO_REASON):
