@@ -156,7 +156,7 @@ def workers(
                 from planners.parallel.dask_cluster import connected
             except ImportError:
                 raise UsageError(
-                    "--scheduler needs the package distributed, which is not installed",
+                    "--scheduler needs the package distributed, 2025.4 or later: it is missing",
                     remedy="Install it: pip install 'coordlang[cluster]'.",
                 ) from None
             cluster = stack.enter_context(connected(scheduler))
