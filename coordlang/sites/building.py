@@ -7,10 +7,10 @@ https://github.com/open-rmf/rmf_traffic_editor has the editor.
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, groupby
+from itertools import chain, combinations, groupby
 from pathlib import Path
 from statistics import fmean
 
@@ -113,8 +113,7 @@ def read_building(path: Path) -> Building:
         raise content.get("levels", root).wrong("this building has no lanes", remedy)
     unscaled = _set_scales(levels, content)
     spawning = _spawning(vertices)
-    _set_names(vertices, {*spawning})
-    places = {vertex.name: vertex.place() for vertex in vertices}
+    places = _places(vertices, {*spawning})
     lanes = [lane for level in levels for lane in level.driven()]
     return Building(
         str(path),
@@ -167,8 +166,9 @@ class _Level:
         self.vertices = [self._vertex(*each, at) for each in enumerate(self._list("vertices"))]
         self.lanes = [self._edge(each) for each in self._list("lanes")]
         numbers = {each.number for start, end, _ in self.lanes for each in (start, end)}
-        #: The vertices with lanes, in the order of the file.
+        #: The vertices with lanes, in the order of the file, and those without.
         self.used = [self.vertices[number] for number in sorted(numbers)]
+        self.left = [vertex for vertex in at.values() if vertex.number not in numbers]
 
     def _list(self, key: str) -> Sequence[Value]:
         return self.content[key].list() if key in self.content else []
@@ -223,12 +223,14 @@ class _Level:
 
     def unused(self) -> Counter[str]:
         """What is in the file and not read, by what it is called there."""
-        lists = {k: v for k, v in self.content.items() if v.is_list and k not in _READ}
-        found = Counter({key: len(value.list()) for key, value in lists.items()})
-        for params in [p for _, _, p in self.lanes] + [p for v in self.used for p in v.params]:
-            found.update(n for n in _IGNORED if _text(params, n) not in ("", "0"))
-        spawning = {v.number for v in self.vertices if v.robots()}
-        found["robots off lanes"] = len(spawning.difference(v.number for v in self.used))
+        found = Counter[str]()
+        for key, value in self.content.items():
+            if value.is_list and key not in _READ:
+                found[key] = len(value.list())
+        lanes = [params for _, _, params in self.lanes]
+        for params in chain(lanes, *(vertex.params for vertex in self.used)):
+            found.update(name for name in _IGNORED if _text(params, name) not in ("", "0"))
+        found["robots off lanes"] = sum(bool(vertex.robots()) for vertex in self.left)
         return +found
 
 
@@ -271,24 +273,35 @@ def _set_image_scales(levels: Sequence[_Level], named: Value | None) -> tuple[st
     The reference level has measurements.  Another one is as large as the fiducials say that both
     have; its own measurements count where there are fewer than two.
     """
-    by_name = {level.name: level for level in levels}
-    if named is not None and named.text() not in by_name:
-        raise named.wrong(f"there is no level {echoed(named.text())}", "Name one of the levels.")
-    reference = levels[0] if named is None else by_name[named.text()]
+    reference = _reference(levels, named)
     known, marks = reference.measured(), reference.fiducials()
     unscaled = []
     for level in levels:
-        own, scale = level.fiducials(), level.measured()
-        pairs = combinations([name for name in marks if name in own], 2)
-        apart = [(math.dist(own[a], own[b]), math.dist(marks[a], marks[b])) for a, b in pairs]
-        if known is not None and apart and all(map(all, apart)):
-            scale = known / fmean(here / there for here, there in apart)
-        if scale is None:
-            if level.used:
-                unscaled.append(level.name)
-            scale = 1.0
-        level.set_scale(scale, scale)
+        size, scale = _size(level.fiducials(), marks), level.measured()
+        if known and size:
+            scale = known / size
+        if not scale and level.used:
+            unscaled.append(level.name)
+        level.set_scale(scale or 1.0, scale or 1.0)
     return tuple(unscaled)
+
+
+def _reference(levels: Sequence[_Level], named: Value | None) -> _Level:
+    if named is None:
+        return levels[0]
+    for level in levels:
+        if level.name == named.text():
+            return level
+    raise named.wrong(f"there is no level {echoed(named.text())}", "Name one of the levels.")
+
+
+def _size(own: Mapping[str, Point], marks: Mapping[str, Point]) -> float | None:
+    """How many times as far apart as others fiducials are, None without two of the same names."""
+    pairs = combinations([name for name in marks if name in own], 2)
+    apart = [(math.dist(own[a], own[b]), math.dist(marks[a], marks[b])) for a, b in pairs]
+    if not apart or not all(map(all, apart)):
+        return None
+    return fmean(here / there for here, there in apart)
 
 
 def _degrees(vertices: Sequence[_Vertex]) -> tuple[float, float, Point]:
@@ -318,14 +331,17 @@ def _spawning(vertices: Iterable[_Vertex]) -> dict[str, _Vertex]:
     return found
 
 
-def _set_names(vertices: Iterable[_Vertex], taken: set[str]) -> None:
+def _places(vertices: Iterable[_Vertex], taken: set[str]) -> dict[str, Place]:
     """Name places as the file does, or, if that is none or taken, by level and vertex, too."""
+    found: dict[str, Place] = {}
     for vertex in vertices:
         number = pddl_name(f"{vertex.level}-{vertex.number}") or f"p-{vertex.number}"
         vertex.name = pddl_name(vertex.said) or number
         while vertex.name in taken:
             vertex.name = f"{vertex.name}-{number}"
         taken.add(vertex.name)
+        found[vertex.name] = vertex.place()
+    return found
 
 
 def _rides(places: Mapping[str, Place], lanes: Sequence[Lane]) -> Iterator[Lane]:
@@ -333,21 +349,19 @@ def _rides(places: Mapping[str, Place], lanes: Sequence[Lane]) -> Iterator[Lane]
 
     The places of a cabin are one group, so that one robot is in it.
     """
-    graphs: dict[str, set[int]] = {name: set() for name in places}
+    graphs, inside = defaultdict[str, set[int]](set), defaultdict[str, list[Place]](list)
     for lane in lanes:
         graphs[lane.start].add(lane.graph)
         graphs[lane.end].add(lane.graph)
-    inside: dict[str, list[Place]] = {}
-    for place in places.values():
-        for lift in _lifts(place):
-            inside.setdefault(lift, []).append(place)
-    for one in places.values():
-        for lift in _lifts(one):
-            for other in inside[lift]:
-                if one.level != other.level:
-                    for graph in sorted(graphs[one.name] & graphs[other.name]):
-                        yield Lane(graph, one.name, other.name, frozenset({lift}))
+    lifts = [(place, lift) for place in places.values() for lift in _lifts(place)]
+    for place, lift in lifts:
+        inside[lift].append(place)
+    for one, lift in lifts:
+        for other in inside[lift]:
+            if one.level != other.level:
+                for graph in sorted(graphs[one.name] & graphs[other.name]):
+                    yield Lane(graph, one.name, other.name, frozenset({lift}))
 
 
 def _lifts(place: Place) -> list[str]:
-    return [group for group in place.groups if group.startswith(_LIFT)]
+    return sorted(group for group in place.groups if group.startswith(_LIFT))

@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, combinations, count, islice
 from pathlib import Path
 
 import networkx as nx
 
 from coordlang.sites.building import Building, Lane, Place, pddl_name
-from coordlang.sites.clearance import clash, excluded, motions, staying
+from coordlang.sites.clearance import clash, excluded, staying
 from coordlang.sites.coordinates import checked
 from planners.system.errors import BadInput, Position, UsageError, note
 from planners.system.messages import counted, echoed, named, some, visible
@@ -95,12 +95,15 @@ _EXCLUDING = {
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A robot by its name in PDDL: where it starts, and where the lanes of its graph lead."""
+    """Where a robot starts, and where the lanes of its graph lead."""
 
-    name: str
     start: str
     graph: int
     reached: frozenset[str]
+
+
+#: The robots by their names in PDDL.
+_Team = Mapping[str, Robot]
 
 
 def building_files(
@@ -120,43 +123,38 @@ def building_files(
         )
     team = _started(building, robots, clearance)
     goals = _goals(building, team, tasks, clearance)
-    used = {robot.graph for robot in team}
-    reached = frozenset[str]().union(*(robot.reached for robot in team))
-    places = {name: place for name, place in building.places.items() if name in reached}
-    lanes = [n for n in building.lanes if {n.start, n.end} <= reached and n.graph in used]
-    blocked, pairs = excluded(places.values(), motions(places, lanes), clearance)
-    graphs = [_graph(number) for number in sorted(used)] if len(used) > 1 else []
-    more = dict.fromkeys([*_EXCLUDING, *_GRAPHS], "") | (_GRAPHS if graphs else {})
-    more |= _EXCLUDING if blocked or pairs else {}
-    listed = [
-        *_header(building, len(places), len(lanes), clearance),
+    used = _used(building, team)
+    graphs = _graphs(team)
+    excluding = _excluding(used, clearance)
+    domain = dict.fromkeys([*_EXCLUDING, *_GRAPHS], "")
+    if graphs:
+        domain |= _GRAPHS
+    if excluding:
+        domain |= _EXCLUDING
+    problem = [
+        *_header(building, used, clearance),
         "(define (problem building)",
         "  (:domain building)",
         "  (:objects",
-        *_declared([robot.name for robot in team], "robot"),
+        *_declared([*team], "robot"),
         *_declared(graphs, "graph"),
-        *_declared([*places], "place"),
+        *_declared([*used.places], "place"),
         "  )",
         "  (:init",
-        *_wrapped([f"(at {robot.name} {robot.start})" for robot in team]),
-        *_wrapped([f"(uses {r.name} {_graph(r.graph)})" for r in team if graphs]),
-        *_wrapped([f"(charger {p.name})" for p in places.values() if p.is_charger]),
-        *_wrapped([f"(parking {p.name})" for p in places.values() if p.is_parking]),
-        *_lanes(places, lanes, with_graphs=bool(graphs)),
-        *(f"    (keeps-clear {place} {lane.start} {lane.end})" for place, lane in blocked),
-        *(f"    (excludes {a.start} {a.end} {b.start} {b.end})" for a, b in pairs),
+        *_facts(used, team, with_graphs=bool(graphs)),
+        *excluding,
         "  )",
         f"  (:goal (and {' '.join(f'(at {robot} {place})' for robot, place in goals.items())}))",
         ")",
     ]
-    coordinates = {n: point for n, point in building.coordinates().items() if n in places}
-    checked(coordinates, Position(building.path))
+    drawn = building.coordinates()
+    coordinates = checked({name: drawn[name] for name in used.places}, Position(building.path))
     texts = {
-        "domain.pddl": _DOMAIN.format(**more),
-        "problem.pddl": "\n".join(listed) + "\n",
+        "domain.pddl": _DOMAIN.format(**domain),
+        "problem.pddl": "\n".join(problem) + "\n",
         "coordinates.json": json.dumps({"coordinates": coordinates}) + "\n",
     }
-    return texts, tuple(robot.name for robot in team)
+    return texts, tuple(team)
 
 
 def unused(building: Building) -> str:
@@ -164,8 +162,40 @@ def unused(building: Building) -> str:
     return named([f"{name} ({number:,})" for name, number in sorted(building.unused.items())])
 
 
-def _header(building: Building, places: int, lanes: int, clearance: float) -> Iterator[str]:
-    file = visible(Path(building.path).name)
+def _used(building: Building, team: _Team) -> Building:
+    """The places that robots can reach, and the lanes between them of the robots' graphs."""
+    reached = frozenset[str]().union(*(robot.reached for robot in team.values()))
+    graphs = {robot.graph for robot in team.values()}
+    places = {name: place for name, place in building.places.items() if name in reached}
+    lanes = [n for n in building.lanes if {n.start, n.end} <= reached and n.graph in graphs]
+    return replace(building, places=places, lanes=tuple(lanes))
+
+
+def _graphs(team: _Team) -> list[str]:
+    """The graphs of the robots; none where all drive on the same one."""
+    numbers = {robot.graph for robot in team.values()}
+    return [_graph(number) for number in sorted(numbers)] if len(numbers) > 1 else []
+
+
+def _graph(number: int) -> str:
+    return f"graph-{number}"
+
+
+def _excluding(building: Building, clearance: float) -> list[str]:
+    """Lines of the problem: where nobody stands, and what nobody drives, while someone drives."""
+    pairs = excluded(building, clearance)
+    return [
+        *(f"    (keeps-clear {b.start} {a.start} {a.end})" for a, b in pairs if b.start == b.end),
+        *(
+            f"    (excludes {a.start} {a.end} {b.start} {b.end})"
+            for a, b in pairs
+            if b.start != b.end
+        ),
+    ]
+
+
+def _header(building: Building, used: Building, clearance: float) -> Iterator[str]:
+    file, places, lanes = visible(Path(building.path).name), len(used.places), len(used.lanes)
     yield f"; Written by coordlang import from {file}: {places} places, {lanes} lanes."
     yield f"; Clearance: {clearance:g} m.  Unnamed places: level and number of the vertex."
     if left := len(building.places) - places:
@@ -174,6 +204,28 @@ def _header(building: Building, places: int, lanes: int, clearance: float) -> It
         yield from textwrap.wrap(
             f"Not used: {unused(building)}.", 98, initial_indent="; ", subsequent_indent=";   "
         )
+
+
+def _facts(building: Building, team: _Team, *, with_graphs: bool) -> Iterator[str]:
+    """Lines of the problem: where robots start, what places are, and the lanes."""
+    yield from _wrapped([f"(at {name} {robot.start})" for name, robot in team.items()])
+    if with_graphs:
+        yield from _wrapped([f"(uses {name} {_graph(r.graph)})" for name, r in team.items()])
+    places = building.places.values()
+    yield from _wrapped([f"(charger {place.name})" for place in places if place.is_charger])
+    yield from _wrapped([f"(parking {place.name})" for place in places if place.is_parking])
+    yield from _lanes(building, with_graphs=with_graphs)
+
+
+def _lanes(building: Building, *, with_graphs: bool) -> Iterator[str]:
+    """The lanes out of each place, each once, and the graphs that have them."""
+    leaving: dict[str, list[Lane]] = {name: [] for name in building.places}
+    for lane in building.lanes:
+        leaving[lane.start].append(lane)
+    for out in leaving.values():
+        yield from _wrapped([*dict.fromkeys(f"(lane {lane.start} {lane.end})" for lane in out)])
+        if with_graphs:
+            yield from _wrapped([f"(on-graph {n.start} {n.end} {_graph(n.graph)})" for n in out])
 
 
 def _wrapped(words: Sequence[str]) -> Iterator[str]:
@@ -190,54 +242,47 @@ def _declared(names: Sequence[str], kind: str) -> Iterator[str]:
     return _wrapped([*names[:-1], f"{names[-1]} - {kind}"] if names else [])
 
 
-def _graph(number: int) -> str:
-    return f"graph-{number}"
-
-
-def _lanes(places: Iterable[str], lanes: Sequence[Lane], *, with_graphs: bool) -> Iterator[str]:
-    """The lanes out of each place in a line, and the graphs that have them."""
-    leaving: dict[str, list[Lane]] = {place: [] for place in places}
-    for lane in lanes:
-        leaving[lane.start].append(lane)
-    for place, out in leaving.items():
-        yield from _wrapped(list(dict.fromkeys(f"(lane {place} {lane.end})" for lane in out)))
-        if with_graphs:
-            yield from _wrapped([f"(on-graph {place} {n.end} {_graph(n.graph)})" for n in out])
-
-
-def _started(
-    building: Building, asked: int | Sequence[str] | None, clearance: float
-) -> list[Robot]:
+def _started(building: Building, asked: int | Sequence[str] | None, clearance: float) -> _Team:
     """The robots that are asked for, each where it spawns, or else in a free charger or place."""
-    if asked is None and not building.spawning:
-        where = Position(building.path)
-        raise BadInput("no robot spawns in this building", position=where, remedy="Say --robots 2.")
-    if asked is None:
-        asked = list(building.spawning)
-    elif isinstance(asked, int):
-        taken = {*building.spawning, *building.places}
-        asked = min(asked, len(building.places) + 1)  # there is no room for more
-        more = (f"r{number}" for number in range(1, 1 + asked + len(taken)))
-        asked = [*building.spawning, *(name for name in more if name not in taken)][:asked]
-    starts: dict[str, str] = {}
-    for said in asked:
-        name = pddl_name(said)
-        if not name or name in starts or name in building.places:
-            remedy = "Give each robot a name of its own, which no place has."
-            raise UsageError(f"--robots: {echoed(said)} cannot be used", remedy=remedy)
-        starts[name] = building.spawning.get(name, "")
-    added = [name for name in starts if not starts[name]]
+    names = _robot_names(building, asked)
+    starts = {name: building.spawning[name] for name in names if name in building.spawning}
+    added = [name for name in names if name not in starts]
     for name in added:
-        starts[name] = _free(building, [place for place in starts.values() if place], clearance)
+        starts[name] = _free(building, starts.values(), clearance)
     if added:
         said = some([f"{name} in {starts[name]}" for name in added], 5)
         note(f"robots that the building does not spawn start where there is room: {said}")
     _require_apart(building, starts, "start", clearance)
-    robots = []
-    for name, start in starts.items():
-        graph = min(lane.graph for lane in building.lanes if start in (lane.start, lane.end))
-        robots.append(Robot(name, start, graph, _reached(building, start, graph)))
-    return robots
+    return {name: _robot(building, starts[name]) for name in names}
+
+
+def _robot_names(building: Building, asked: int | Sequence[str] | None) -> Sequence[str]:
+    """The PDDL names of the robots that are asked for: if by a number, those that spawn first."""
+    if asked is None:
+        if not building.spawning:
+            what, where = "no robot spawns in this building", Position(building.path)
+            raise BadInput(what, position=where, remedy="Say --robots 2.")
+        return [*building.spawning]
+    if isinstance(asked, int):
+        taken = {*building.spawning, *building.places}
+        free = (name for number in count(1) if (name := f"r{number}") not in taken)
+        most = len(building.places) + 1  # there is no room for more
+        return [*islice(chain(building.spawning, free), min(asked, most))]
+    names: list[str] = []
+    for said in asked:
+        name = pddl_name(said)
+        if not name or name in names or name in building.places:
+            remedy = "Give each robot a name of its own, which no place has."
+            raise UsageError(f"--robots: {echoed(said)} cannot be used", remedy=remedy)
+        names.append(name)
+    return names
+
+
+def _robot(building: Building, start: str) -> Robot:
+    """A robot that drives on the first graph with a lane at its start."""
+    graph = min(lane.graph for lane in building.lanes if start in (lane.start, lane.end))
+    lanes = nx.DiGraph((lane.start, lane.end) for lane in building.lanes if lane.graph == graph)
+    return Robot(start, graph, frozenset({start, *nx.descendants(lanes, start)}))
 
 
 def _free(building: Building, taken: Iterable[str], clearance: float) -> str:
@@ -252,45 +297,47 @@ def _free(building: Building, taken: Iterable[str], clearance: float) -> str:
 
 
 def _goals(
-    building: Building, robots: Sequence[Robot], tasks: Sequence[str], clearance: float
+    building: Building, team: _Team, tasks: Sequence[str], clearance: float
 ) -> dict[str, str]:
     """Where robots have to end, as tasks say; all where they start, if there is no task."""
     if not tasks:
-        return {robot.name: robot.start for robot in robots}
+        return {name: robot.start for name, robot in team.items()}
     goals: dict[str, str] = {}
     for task in tasks:
         said, _, where = task.partition(":")
-        robot = next((r for r in robots if r.name == pddl_name(said)), None)
-        if robot is None or robot.name in goals:
-            names = some([each.name for each in robots], 10)
-            what = "has a task already" if robot else "is no robot"
-            remedy = f"Expected ROBOT:PLACE, once for each of {names}."
+        name = pddl_name(said)
+        if name not in team or name in goals:
+            what = "has a task already" if name in team else "is no robot"
+            remedy = f"Expected ROBOT:PLACE, once for each of {some([*team], 10)}."
             raise UsageError(f"--task {echoed(task)}: {echoed(said)} {what}", remedy=remedy)
-        place = _place_called(where, robot, building, task)
-        if place not in robot.reached:
-            what = "no lanes lead there" if place in building.places else "there is no such place"
-            remedy = f"It can go to {some(sorted(robot.reached), 40)}."
-            raise UsageError(f"--task {echoed(task)}: {what}", remedy=remedy)
-        goals[robot.name] = place
+        goals[name] = _goal(building, team[name], task, where)
     _require_apart(building, goals, "end", clearance)
     return goals
 
 
-def _place_called(where: str, robot: Robot, building: Building, task: str) -> str:
-    """The PDDL name of a place that a task calls as the file does, or PDDL, or by its vertex.
-
-    Raises `UsageError` where the robot can go to several places of the name.
-    """
-    name, places = pddl_name(where), building.places.values()
-    said = [p for p in places if where and p.said == where]
-    alike = [p for p in places if name and name in (p.name, pddl_name(p.said))]
-    named_so = [p for p in places if p.vertex == where] or said or alike
-    found = [p for p in named_so if p.name in robot.reached] or named_so[:1]
+def _goal(building: Building, robot: Robot, task: str, where: str) -> str:
+    """The place that a task calls so; `UsageError` unless the robot can go to exactly one."""
+    called = _called(where, building.places.values())
+    found = [place for place in called if place.name in robot.reached]
     if len(found) > 1:
-        what = f"--task {echoed(task)}: {counted(len(found), 'place')} have this name"
-        remedy = f"Say their level and vertex: {named([p.vertex for p in found][:10], 'or')}."
-        raise UsageError(what, remedy=remedy)
-    return found[0].name if found else name
+        what = f"{counted(len(found), 'place')} have this name"
+        remedy = f"Say their level and vertex: {named([p.vertex for p in found[:10]], 'or')}."
+        raise UsageError(f"--task {echoed(task)}: {what}", remedy=remedy)
+    if not found:
+        what = "no lanes lead there" if called else "there is no such place"
+        remedy = f"It can go to {some(sorted(robot.reached), 40)}."
+        raise UsageError(f"--task {echoed(task)}: {what}", remedy=remedy)
+    return found[0].name
+
+
+def _called(where: str, places: Collection[Place]) -> list[Place]:
+    """The places that a task calls so: by level and vertex, else as the file, else as PDDL does."""
+    by_vertex = {place.vertex: place for place in places}
+    if where in by_vertex:
+        return [by_vertex[where]]
+    said = [place for place in places if where and place.said == where]
+    name = pddl_name(where)
+    return said or [p for p in places if name and name in (p.name, pddl_name(p.said))]
 
 
 def _require_apart(
@@ -307,9 +354,3 @@ def _require_apart(
 
 def _too_near(one: Place, other: Place, clearance: float) -> bool:
     return one is other or clash(staying(one), staying(other), clearance)
-
-
-def _reached(building: Building, start: str, graph: int) -> frozenset[str]:
-    """Where the lanes of a graph lead from a place that is on some of them."""
-    lanes = nx.DiGraph((lane.start, lane.end) for lane in building.lanes if lane.graph == graph)
-    return frozenset({start, *nx.descendants(lanes, start)})

@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import compress
 
 import numpy as np
 
-from coordlang.sites.building import Lane, Place
+from coordlang.sites.building import Building, Place
 from coordlang.sites.coordinates import Point
 from planners.joint.tables import Bools
 
@@ -38,21 +37,20 @@ def staying(place: Place) -> Motion:
     return Motion(place.name, place.name, {place.level: (place.point, place.point)}, place.groups)
 
 
-def motions(places: Mapping[str, Place], lanes: Iterable[Lane]) -> list[Motion]:
+def _driving(building: Building) -> list[Motion]:
     """Driving along lanes; each of them once, whatever the graphs that have it."""
     groups: dict[tuple[str, str], frozenset[str]] = {}
-    for lane in lanes:
+    for lane in building.lanes:
         ends = lane.start, lane.end
-        own = lane.groups | places[lane.start].groups | places[lane.end].groups
-        groups[ends] = groups.get(ends, frozenset()) | own
-    found = []
-    for (start, end), those in groups.items():
-        one, other = places[start], places[end]
-        on = {each.level: (each.point, each.point) for each in (one, other)}  # a ride in a lift
-        if one.level == other.level:
-            on = {one.level: (one.point, other.point)}
-        found.append(Motion(start, end, on, those))
-    return found
+        groups[ends] = groups.get(ends, frozenset()) | lane.groups
+    return [_drive(building.places[a], building.places[b], own) for (a, b), own in groups.items()]
+
+
+def _drive(start: Place, end: Place, groups: frozenset[str]) -> Motion:
+    on = {place.level: (place.point, place.point) for place in (start, end)}  # a ride in a lift
+    if start.level == end.level:
+        on = {start.level: (start.point, end.point)}
+    return Motion(start.name, end.name, on, groups | start.groups | end.groups)
 
 
 def clash(one: Motion, other: Motion, clearance: float) -> bool:
@@ -63,30 +61,16 @@ def clash(one: Motion, other: Motion, clearance: float) -> bool:
     return any(distance(one.on[k], other.on[k]) < clearance - _ROUNDING for k in levels)
 
 
-def excluded(
-    places: Iterable[Place], driving: Iterable[Motion], clearance: float
-) -> tuple[list[tuple[str, Motion]], list[tuple[Motion, Motion]]]:
-    """The places where nobody may stand while someone drives along a lane, and pairs of lanes.
+def excluded(building: Building, clearance: float) -> list[tuple[Motion, Motion]]:
+    """Driving along a lane, and what nobody may do meanwhile: drive along another one, or stay.
 
     What the rules for every pair of robots forbid is left out: sharing a place, and swapping.
     """
-    driving, still = list(driving), list(map(staying, places))
-    if not driving or (clearance <= 0 and not any(motion.groups for motion in driving)):
-        return [], []
-    near = _near([*driving, *still], clearance)
-    blocked = [
-        (stays.start, drives)
-        for drives, row in zip(driving, near, strict=False)
-        for stays in compress(still, row[len(driving) :])
-        if stays.start not in (drives.start, drives.end) and clash(stays, drives, clearance)
-    ]
-    pairs = [
-        (one, other)
-        for number, one in enumerate(driving)
-        for other in compress(driving[number + 1 :], near[number, number + 1 :])
-        if not _is_ruled_out(one, other) and clash(one, other, clearance)
-    ]
-    return blocked, pairs
+    driving = _driving(building)
+    motions = [*driving, *map(staying, building.places.values())]
+    near = np.triu(_near(motions, clearance), 1)[: len(driving)]
+    pairs = [(motions[first], motions[second]) for first, second in np.argwhere(near).tolist()]
+    return [pair for pair in pairs if not _is_ruled_out(*pair) and clash(*pair, clearance)]
 
 
 def _is_ruled_out(one: Motion, other: Motion) -> bool:

@@ -77,19 +77,21 @@ def from_names(names: Sequence[str], links: Sequence[tuple[str, str]]) -> dict[s
     None unless all names have one form with two numbers, all points differ, and most links join
     neighbours on the grid.
     """
-    matches = [match for match in map(_PAIR.fullmatch, names) if match is not None]
-    if len(names) < 2 or len(matches) < len(names):
+    pairs = _numbers(names)
+    if len(names) < 2 or len({*pairs}) < len(names) or max(map(max, pairs)) >= _LARGEST:
         return None
-    forms = {(m["stem"], m["between"], m["end"]) for m in matches}
-    if len(forms) > 1:
-        return None
-    pairs = [(float(m["first"]), float(m["second"])) for m in matches]
-    if not _COLUMN.search(matches[0]["stem"].lower()):
-        pairs = [(column, row) for row, column in pairs]
     points = dict(zip(names, pairs, strict=True))
     near = [math.dist(points[a], points[b]) < 1.5 for a, b in links]
-    if len(set(pairs)) < len(names) or sum(near) < 0.8 * len(near):
-        return None
-    if max(map(max, pairs)) >= _LARGEST:
-        return None
-    return points
+    return points if sum(near) >= 0.8 * len(near) else None
+
+
+def _numbers(names: Sequence[str]) -> list[Point]:
+    """Column and row in each name; nothing unless all names have one form with two numbers."""
+    matches = [match for match in map(_PAIR.fullmatch, names) if match is not None]
+    forms = {(m["stem"], m["between"], m["end"]) for m in matches}
+    if len(matches) < len(names) or len(forms) != 1:
+        return []
+    pairs = [(float(m["first"]), float(m["second"])) for m in matches]
+    if _COLUMN.search(matches[0]["stem"].lower()):
+        return pairs
+    return [(column, row) for row, column in pairs]

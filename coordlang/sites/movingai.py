@@ -20,6 +20,7 @@ from planners.system.messages import echoed
 PASSABLE = ".GS"
 BLOCKED = "@OTW"
 _UNKNOWN = re.compile(f"[^{PASSABLE}{BLOCKED}]")
+_CHARACTERS = f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}."
 #: The columns of a scenario file.
 _COLUMNS = "bucket, map, width, height, start x, start y, goal x, goal y, optimal length"
 
@@ -55,31 +56,34 @@ def read_map(path: Path) -> MovingMap:
     Raises `BadInput` for anything else, with the line.
     """
     lines = _lines(path, "map")
-    sizes, header = _header(path, lines)
+    height, width, header = _header(path, lines)
     rows = [line.rstrip() for line in lines[header:]]
-    while len(rows) > sizes["height"] and not rows[-1]:
+    while len(rows) > height and not rows[-1]:
         rows.pop()
-    characters = f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}."
-    for number, row in enumerate(rows[: sizes["height"]], start=header + 1):
-        if len(row) != sizes["width"]:
-            what = f"this row has {len(row)} cells where the header says {sizes['width']}"
-            raise _wrong(what, "Correct the header or the rows.", path, number)
-        if unknown := _UNKNOWN.search(row):
-            what = f"unknown character {unknown[0]!r} in the map"
-            raise _wrong(what, characters, path, number, unknown.start() + 1)
-    if len(rows) != sizes["height"]:
-        last = header + 1 + min(len(rows), sizes["height"])
-        what = f"the map has {len(rows)} rows where the header says {sizes['height']}"
+    for number, row in enumerate(rows[:height], start=header + 1):
+        _check_row(path, number, row, width)
+    if len(rows) != height:
+        what = f"the map has {len(rows)} rows where the header says {height}"
+        last = header + 1 + min(len(rows), height)
         raise _wrong(what, "Correct the header or the rows.", path, last)
-    cells = [
-        (row, column)
+    cells = {
+        cell_name((row, column)): (row, column)
         for row, line in enumerate(rows)
         for column, ground in enumerate(line)
         if ground in PASSABLE
-    ]
+    }
     if not cells:
-        raise _wrong("this map has no passable cell", characters, path, header + 1)
-    return MovingMap(**sizes, cells={cell_name(cell): cell for cell in cells})
+        raise _wrong("this map has no passable cell", _CHARACTERS, path, header + 1)
+    return MovingMap(height, width, cells)
+
+
+def _check_row(path: Path, number: int, row: str, width: int) -> None:
+    if len(row) != width:
+        what = f"this row has {len(row)} cells where the header says {width}"
+        raise _wrong(what, "Correct the header or the rows.", path, number)
+    if unknown := _UNKNOWN.search(row):
+        what = f"unknown character {unknown[0]!r} in the map"
+        raise _wrong(what, _CHARACTERS, path, number, unknown.start() + 1)
 
 
 def read_agents(path: Path, grid: MovingMap, agents: int) -> tuple[Agent, ...]:
@@ -196,21 +200,21 @@ def _lines(path: Path, what: str) -> list[str]:
     return data.decode("ascii").splitlines()
 
 
-def _header(path: Path, lines: Sequence[str]) -> tuple[dict[str, int], int]:
-    """The ``height`` and ``width`` of a map, and the number of its header's last line."""
+def _header(path: Path, lines: Sequence[str]) -> tuple[int, int, int]:
+    """The height and width of a map, and the number of its header's last line."""
     sizes: dict[str, int] = {}
     for number, line in enumerate(lines, start=1):
-        key, *values = line.split() or ["type", ""]
-        size = _natural(values[0]) if len(values) == 1 else None
-        if [key, *values] == ["map"] and len(sizes) == 2:
-            return sizes, number
-        if key in ("height", "width") and key not in sizes and size:
-            sizes[key] = size
-        elif key != "type" or len(values) != 1:
-            expected = "Expected 'height N' and 'width N' (once each, N from 1), then 'map'."
-            raise _wrong(
-                f"unexpected {echoed(line)} in the header of a map", expected, path, number
-            )
+        match line.split():
+            case ["map"] if len(sizes) == 2:
+                return sizes["height"], sizes["width"], number
+            case ["height" | "width" as key, text] if key not in sizes and (size := _natural(text)):
+                sizes[key] = size
+            case [] | ["type", _]:
+                pass
+            case _:
+                what = f"unexpected {echoed(line)} in the header of a map"
+                remedy = "Expected 'height N' and 'width N' (once each, N from 1), then 'map'."
+                raise _wrong(what, remedy, path, number)
     expected = "Expected 'type octile', 'height N', 'width N', 'map', and then the rows."
     raise _wrong("this file has no line 'map'", expected, path, max(1, len(lines)))
 

@@ -6,7 +6,7 @@ It is found from the actions and the static atoms of the model alone, see `_loca
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import permutations
@@ -55,19 +55,15 @@ class World:
     def moves(self, model: JointModel, robot: int, label: int) -> tuple[tuple[str, str], ...]:
         """Return where a robot's subaction always brings things: pairs (thing, place)."""
         text = model.subaction_text(robot, label)
-        if text is None:
-            return ()
-        found = []
-        for action in model.actions:
-            if action.part_of(robot) != text:
-                continue
-            added = (e.atom for e in action.effects if e.adds and e.condition == TRUE)
-            roles = (self.role(show(atom)) for atom in added)
-            brought = {(role[1], role[2]) for role in roles if role[0] == "at"}
-            if action.parts:  # a joint action also moves the other robots
-                brought = {(t, place) for t, place in brought if t == model.robots[robot]}
-            found.append(brought)
-        return tuple(sorted(set.intersection(*found))) if found else ()
+        own = [action for action in model.actions if text and action.part_of(robot) == text]
+        brought = [self._brought(action, model.robots[robot]) for action in own]
+        return tuple(sorted(set.intersection(*brought))) if brought else ()
+
+    def _brought(self, action: GroundAction, robot: str) -> set[tuple[str, str]]:
+        """Where a robot's action always brings things; of a joint action only the robot itself."""
+        added = (show(e.atom) for e in action.effects if e.adds and e.condition == TRUE)
+        at = (role[1:] for role in map(self.role, added) if role[0] == "at")
+        return {(thing, place) for thing, place in at if thing == robot or not action.parts}
 
 
 def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
@@ -103,8 +99,8 @@ def _location_roles(
     for reading in locations:
         for atom, thing, place in reading.atoms:
             if place in places and thing not in places:
-                owner = _owner(reading, model) if thing is None else thing
-                roles.setdefault(show(atom), (atom, ("at", owner, place)))
+                role = "at", thing or _owner(reading, model), place
+                roles.setdefault(show(atom), (atom, role))
     return roles
 
 
@@ -129,19 +125,23 @@ def _without_ambiguous(
     located = Counter(predicate for predicate, _ in pairs)
     ambiguous: set[tuple[str, str]] = set()
     for state in states:
-        said: dict[str, list[str]] = {}
-        for atom, role in (roles[text] for text in state if text in roles):
-            said.setdefault(role[1], []).append(atom.predicate)
+        said = defaultdict[str, list[str]](list)
+        for atom, role in map(roles.__getitem__, roles.keys() & state):
+            said[role[1]].append(atom.predicate)
         for thing, predicates in said.items():
-            most = max(located[predicate] for predicate in predicates)
-            best = [predicate for predicate in predicates if located[predicate] == most]
-            kept = best if len(best) == 1 else []
-            ambiguous |= {(thing, predicate) for predicate in predicates if predicate not in kept}
+            ambiguous |= {(thing, predicate) for predicate in _vague(predicates, located)}
     return {
         text: role
         for text, (atom, role) in roles.items()
         if (role[1], atom.predicate) not in ambiguous
     }
+
+
+def _vague(predicates: Sequence[str], located: Mapping[str, int]) -> set[str]:
+    """The predicates of a thing's atoms in a state, without one that locates more than all."""
+    most = max(located[predicate] for predicate in predicates)
+    best = [predicate for predicate in predicates if located[predicate] == most]
+    return set(predicates).difference(best if len(best) == 1 else ())
 
 
 def _other_role(atom: Atom, places: frozenset[str], things: set[str]) -> Role:
@@ -174,33 +174,45 @@ class _Reading:
     """A predicate read as "a thing is in a place", and what atoms and actions say then.
 
     ``place`` is the argument that is the place, ``thing`` the one that is the thing; None if it has
-    none, as ``(stops floor)``.  ``atoms`` come with their thing and place, ``moves`` are the pairs
-    of places between which actions of ``owners`` move a thing, ``signs`` say whether actions make
-    it true, and false.
+    none, as ``(stops floor)``: its name is empty then.  ``atoms`` come with their ``things`` and
+    ``places``, ``moves`` are the pairs of places between which actions of ``owners`` move a thing,
+    ``signs`` say whether actions make it true, and false.
     """
 
     predicate: str
     place: int
     thing: int | None
-    atoms: list[tuple[Atom, str | None, str]] = field(default_factory=list)
+    atoms: list[tuple[Atom, str, str]] = field(default_factory=list)
+    things: set[str] = field(default_factory=set)
+    places: set[str] = field(default_factory=set)
     moves: set[tuple[str, str]] = field(default_factory=set)
     owners: set[tuple[int, ...]] = field(default_factory=set)
     signs: set[bool] = field(default_factory=set)
 
-    def read(self, atom: Atom) -> tuple[str | None, str] | None:
-        """Return an atom's thing and place, None for another predicate."""
-        if atom.predicate != self.predicate or len(atom.args) != 1 + (self.thing is not None):
-            return None
-        return None if self.thing is None else atom.args[self.thing], atom.args[self.place]
+    def read(self, atom: Atom) -> tuple[str, str]:
+        """Return the thing and the place of an atom of the predicate."""
+        return "" if self.thing is None else atom.args[self.thing], atom.args[self.place]
 
-    def take_in(self, action: GroundAction) -> None:
-        read = ((effect.adds, self.read(effect.atom)) for effect in action.effects)
-        changes = [(adds, *found) for adds, found in read if found is not None]
-        self.signs |= {adds for adds, _, _ in changes}
-        for (adds, thing, source), (enters, other, target) in permutations(changes, 2):
-            if enters and not adds and thing == other and source != target:
+    def take_in(self, atom: Atom) -> None:
+        thing, place = self.read(atom)
+        self.atoms.append((atom, thing, place))
+        self.things.add(thing)
+        self.places.add(place)
+
+    def take_in_action(self, action: GroundAction) -> None:
+        kind = self.predicate, 1 if self.thing is None else 2
+        own = [e for e in action.effects if (e.atom.predicate, len(e.atom.args)) == kind]
+        self.signs |= {effect.adds for effect in own}
+        for left, entered in permutations(own, 2):
+            (thing, source), (other, target) = self.read(left.atom), self.read(entered.atom)
+            if entered.adds and not left.adds and thing == other and source != target:
                 self.moves.add((source, target))
                 self.owners.add(action.owners)
+
+    def is_among(self, places: Set[str]) -> bool:
+        """Whether actions put things into known places, and take them from there."""
+        is_known = self.places <= places and self.things.isdisjoint(places)
+        return is_known and self.thing is not None and self.signs == {True, False}
 
 
 def _readings(model: JointModel) -> list[_Reading]:
@@ -209,12 +221,11 @@ def _readings(model: JointModel) -> list[_Reading]:
     found: dict[tuple[str, int, int | None], _Reading] = {}
     for atom in model.codec.facts.atoms:
         for way in ways.get(len(atom.args), ()):
-            reading = found.setdefault((atom.predicate, *way), _Reading(atom.predicate, *way))
-            thing = None if reading.thing is None else atom.args[reading.thing]
-            reading.atoms.append((atom, thing, atom.args[reading.place]))
+            key = atom.predicate, *way
+            found.setdefault(key, _Reading(*key)).take_in(atom)
     for reading in found.values():
         for action in model.actions:
-            reading.take_in(action)
+            reading.take_in_action(action)
     return sorted(found.values(), key=lambda p: (p.thing is None, p.predicate, -p.place))
 
 
@@ -230,19 +241,11 @@ def _locations(model: JointModel) -> tuple[list[_Reading], set[str]]:
     """
     readings, kept, places = _readings(model), list[_Reading](), set[str]()
     for reading in readings:
-        own = {place for _, _, place in reading.atoms}
-        things = {thing for _, thing, _ in reading.atoms if thing}
-        contradicts = own & {*things, *model.robots} or things & places
-        elsewhere = reading.thing is None and places and not own <= places
+        things = reading.things
+        contradicts = (reading.places & {*things, *model.robots}) | (things & places)
+        elsewhere = reading.thing is None and places and not reading.places <= places
         if reading.moves and not contradicts and not elsewhere:
             kept.append(reading)
-            places |= own
-    further = [
-        r
-        for r in readings
-        if r not in kept
-        and r.thing is not None
-        and r.signs == {True, False}
-        and all(place in places and thing not in places for _, thing, place in r.atoms)
-    ]
+            places |= reading.places
+    further = [each for each in readings if each not in kept and each.is_among(places)]
     return [*kept, *further], places
