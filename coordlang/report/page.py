@@ -63,10 +63,8 @@ def page_data(
     """
     first = selection.tasks[0].language
     model = first.model
-    tables = Tables(len(model.robots))
     listed = _listed(language)
-    for key in listed:  # they are the first states
-        tables.state(key)
+    tables = Tables(len(model.robots), listed)
     tasks = [task_data(shown, tables, seed) for shown in selection.tasks]
     rows = np.stack([*map(model.codec.parse_key, tables.states)])
     states = [*map(model.codec.decode, rows)]
@@ -97,7 +95,7 @@ def page_data(
         "state_words": first.partition.word_of(rows).tolist(),
         "mapped": len(listed),
         "pair": _pair(world, states[: len(listed)], starts),
-        "state_graph": _state_graph(first) if 1 < len(listed) <= _STATES_DRAWN else None,
+        "state_graph": _state_graph(first, len(listed)),
         "tasks": tasks,
         "candidates": {
             "count": str(language.provenance.tasks.get("count", 0)),
@@ -220,11 +218,14 @@ def _labels(model: JointModel, world: World, robot: int, texts: Iterable[str | N
     return shown
 
 
-def _state_graph(language: TaskLanguage) -> dict[str, Any]:
+def _state_graph(language: TaskLanguage, listed: int) -> dict[str, Any] | None:
     """The listed states, in the order of their keys, and the joint steps between them.
 
-    Two states are joined if a step leads from one to the other, in either direction.
+    Two states are joined if a step leads from one to the other, in either direction.  None if there
+    are too many or too few.
     """
+    if not 1 < listed <= _STATES_DRAWN:
+        return None
     model, rows = language.model, language.partition.rows
     keys = [model.codec.key(row) for row in rows]
     rank = np.argsort(np.argsort(np.array(keys, object)))
@@ -281,8 +282,8 @@ def make_report(
     messages name as the place of the language.  Raises `OutOfMemory` if the page of a single task
     would be too large, and what `coordlang.report.shown.select_tasks` raises.
     """
-    position = position or Position("the language file")
-    points = coordinates or {}
+    position, points = position or Position("the language file"), coordinates or {}
+    options = options or options_of(language)
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
     model = selection.tasks[0].language.model
     lifted = lifted_words(language, domain, problems[0], model, points, position)
@@ -299,22 +300,23 @@ def make_report(
         "seed": seed,
         "is_mapped": all(task.language.is_mapped for task in selection.tasks),
     }
+    data = page_data(language, selection, seed, points)
     heat = None
-    while True:
+    if data["places"]:
+        heat = heat_of(language, domain, problems, options, selection, position)
+    while len(html := _render({**shown, **drawn_plan(data, heat)}, data)) > LARGEST:
+        selection = _halved(selection, len(html))
         data = page_data(language, selection, seed, points)
-        if heat is None and data["places"]:
-            known = options or options_of(language)
-            heat = heat_of(language, domain, problems, known, selection, position)
-        html = _render({**shown, **drawn_plan(data, heat)}, data)
-        if len(html) <= LARGEST:
-            return Report(html, language, selection)
-        if len(selection.tasks) == 1:
-            raise OutOfMemory(
-                f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}",
-                remedy="Give a smaller problem.",
-            )
-        half = selection.tasks[: len(selection.tasks) // 2]
-        selection = replace(selection, tasks=half, complete=False)
+    return Report(html, language, selection)
+
+
+def _halved(selection: Selection, size: int) -> Selection:
+    """Half of the tasks of a page of so many bytes."""
+    if len(selection.tasks) == 1:
+        what = f"the page of one task would have {size:,} bytes, more than {LARGEST:,}"
+        raise OutOfMemory(what, remedy="Give a smaller problem.")
+    half = selection.tasks[: len(selection.tasks) // 2]
+    return replace(selection, tasks=half, complete=False)
 
 
 def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:

@@ -10,7 +10,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import chain, combinations, pairwise
+from operator import itemgetter
 from typing import Any
 
 from coordlang.language.recorded import recorded_candidates
@@ -77,17 +78,24 @@ def heat_of(
     there; None if there are no others.
     """
     first = selection.tasks[0].language
-    tasks, robots = language.provenance.tasks, len(first.model.robots)
     if first.model.hides_slack or language.may_fail:
         return None
-    is_few = len(language.states) ** 2 * robots <= _MOST_PAIRS and not first.model.is_asynchronous
-    if tasks.get("kind") == "all" and is_few:
+    is_few = len(language.states) ** 2 * len(first.model.robots) <= _MOST_PAIRS
+    if (
+        language.provenance.tasks.get("kind") == "all"
+        and is_few
+        and not first.model.is_asynchronous
+    ):
         with suppress(BadInput, ProvedImpossible):  # a language may be used on another map
             candidates = recorded_candidates(language, domain, [*problems], options, position)
             found = differences(candidates, Workers(), most=_MIXTURES).divergences
             if found is not None:
                 known = _located(first.model, [(candidates.rows, found)])
                 return counted_heat(known, candidates.count, every=True)
+    return _heat_of_shown(first.model, selection)
+
+
+def _heat_of_shown(model: JointModel, selection: Selection) -> Heat | None:
     listed = []
     for task in selection.tasks:
         space = task.language.space
@@ -95,26 +103,22 @@ def heat_of(
             if task.decided and task.language.covered:
                 listed.append((space.rows, minimal(divergences(Choices(space), most=_MIXTURES))))
     every = selection.complete and len(listed) == len(selection.tasks)
-    heat = counted_heat(_located(first.model, listed), len(listed), every=every)
+    heat = counted_heat(_located(model, listed), len(listed), every=every)
     return heat if listed else None
 
 
 def _located(model: JointModel, listed: Iterable[tuple[Rows, Ints]]) -> list[Divergence]:
     """Divergences, each once, as rows of numbers into tables of states, by where robots are."""
-    texts: dict[bytes, tuple[str, ...]] = {}
-    once: dict[tuple[bytes, ...], None] = {}
-    for states, found in listed:
-        keys = {number: states[number].tobytes() for number in set(found.ravel().tolist()) - {-1}}
-        texts |= {key: model.codec.decode(states[number]) for number, key in keys.items()}
+    once: dict[tuple[tuple[str, ...], ...], None] = {}
+    for rows, found in listed:
+        numbers = {*found.ravel().tolist()} - {-1}
+        texts = {number: tuple(model.codec.decode(rows[number])) for number in numbers}
         for last, *after in found.tolist():
-            once[keys[last], *sorted(keys[number] for number in after if number >= 0)] = None
-    world = find_world(model, list(texts.values()))
-    robots = {*model.robots}
-    at = {
-        key: {thing: place for thing, place in world.located(text).items() if thing in robots}
-        for key, text in texts.items()
-    }
-    return [(at[last], [at[key] for key in after]) for last, *after in once]
+            once[texts[last], *sorted(texts[number] for number in after if number >= 0)] = None
+    states = [*dict.fromkeys(chain(*once))]
+    world = find_world(model, states)
+    at = {state: world.located(state, model.robots) for state in states}
+    return [(at[last], [at[state] for state in after]) for last, *after in once]
 
 
 def counted_heat(known: Sequence[Divergence], tasks: int, *, every: bool) -> Heat:
@@ -123,8 +127,8 @@ def counted_heat(known: Sequence[Divergence], tasks: int, *, every: bool) -> Hea
     for last, after in known:
         torn = [robot for robot in last if len({at.get(robot) for at in after}) > 1]
         places.update({last[robot] for robot in torn})
-        driven = {(last[robot], at[robot]) for robot in torn for at in after if robot in at}
-        lanes.update({(min(ends), max(ends)) for ends in driven if ends[0] != ends[1]})
+        ways = {frozenset((last[r], at.get(r, last[r]))) for r in torn for at in after}
+        lanes.update((min(way), max(way)) for way in ways if len(way) == 2)
     return Heat(places, lanes, len(known), tasks, every)
 
 
@@ -138,23 +142,31 @@ def heat_map(heat: Heat, names: Sequence[str], links: Sequence[tuple[int, int]])
     lanes = [(" – ".join(pair), heat.lanes.get(pair, 0)) for pair in ends]
     places = [(name, heat.places.get(name, 0)) for name in names]
     top = sorted([*places, *lanes], key=lambda known: -known[1])[:_TOP]
+    every = "all " if heat.every and heat.tasks > 1 else ""
+    return {
+        "found": heat.found,
+        "of": f"of {every}{counted(heat.tasks, 'task')}",
+        "top": named([f"{name} ({number:,})" for name, number in top if number]),
+        "scale": _scale(bounds),
+        "lanes": _looks(lanes, bounds),
+        "spots": _looks(places, bounds),
+    }
+
+
+def _scale(bounds: Sequence[int]) -> list[tuple[str, str]]:
+    """The look of each class, and which numbers are in it."""
     scale = [("h0", "0")]
     for number, (below, high) in enumerate(pairwise(bounds), 1):
         span = f"{high:,}" if below + 1 == high else f"{below + 1:,} to {high:,}"
         scale.append((f"h{number}", span))
+    return scale
 
-    def shown(name: str, number: int) -> dict[str, str]:
-        look = f"h{bisect_left(bounds, number)}"
-        return {"look": look, "title": f"{name}: {number:,}", "text": ""}
 
-    return {
-        "found": heat.found,
-        "of": f"of {'all ' if heat.every and heat.tasks > 1 else ''}{counted(heat.tasks, 'task')}",
-        "top": named([f"{name} ({number:,})" for name, number in top if number]),
-        "scale": scale,
-        "lanes": [shown(*lane) for lane in lanes],
-        "spots": [shown(*place) for place in places],
-    }
+def _looks(known: Iterable[tuple[str, int]], bounds: Sequence[int]) -> list[dict[str, str]]:
+    return [
+        {"look": f"h{bisect_left(bounds, number)}", "title": f"{name}: {number:,}", "text": ""}
+        for name, number in known
+    ]
 
 
 #: Width and greatest height of a plan, and the room around its places, in units of the drawing.
@@ -228,25 +240,34 @@ def _labels(
     """Each name where it crosses the fewest links, on nothing else that is drawn."""
     taken: list[_Box] = [(x - radius, y - radius, x + radius, y + radius) for x, y in points]
     for place in sorted(range(len(names)), key=lambda p: bool(_NUMBERED.fullmatch(names[p]))):
-        (x, y), wide = points[place], _LETTER * len(names[place])
-        gap = radius + 4
-        ways = [
-            (x + gap, y + 4, "start", x + gap),
-            (x - gap, y + 4, "end", x - gap - wide),
-            (x, y - gap, "middle", x - wide / 2),
-            (x, y + gap + 9, "middle", x - wide / 2),
+        free = [
+            (sum(_crosses(box, points[a], points[b]) for a, b in links), box, label)
+            for box, label in _beside(names[place], points[place], radius + 4)
+            if _is_inside(box, height) and not any(_overlap(box, other) for other in taken)
         ]
-        free = []
-        for order, (at, base, anchor, left) in enumerate(ways):
-            box = left, base - _LINE + 3, left + wide, base + 3
-            inside = box[0] >= 0 and box[2] <= WIDTH and box[1] >= 0 and box[3] <= height
-            if inside and not any(_overlap(box, other) for other in taken):
-                crossed = sum(_crosses(box, points[a], points[b]) for a, b in links)
-                free.append((crossed, order, box, Label(names[place], at, base, anchor)))
         if free:
-            *_, box, label = min(free, key=lambda found: found[:2])
+            _, box, label = min(free, key=itemgetter(0))
             taken.append(box)
             yield label
+
+
+def _beside(name: str, point: Point, gap: float) -> list[tuple[_Box, Label]]:
+    """Where a name may stand: to the right of its place, to the left, above, below."""
+    (x, y), wide = point, _LETTER * len(name)
+    ways = [
+        (x + gap, y + 4, "start", x + gap),
+        (x - gap, y + 4, "end", x - gap - wide),
+        (x, y - gap, "middle", x - wide / 2),
+        (x, y + gap + 9, "middle", x - wide / 2),
+    ]
+    return [
+        ((left, base - _LINE + 3, left + wide, base + 3), Label(name, at, base, anchor))
+        for at, base, anchor, left in ways
+    ]
+
+
+def _is_inside(box: _Box, height: float) -> bool:
+    return box[0] >= 0 and box[2] <= WIDTH and box[1] >= 0 and box[3] <= height
 
 
 def _overlap(one: _Box, other: _Box) -> bool:
@@ -266,23 +287,22 @@ def drawn_plan(data: Mapping[str, Any], heat: Heat | None) -> dict[str, Any]:
     None for words that are shown as small maps or on no map, and where no robot is torn.
     """
     names = [place["name"] for place in data["places"]]
-    plan = None
-    if names:
-        points = [(place["x"], place["y"]) for place in data["places"]]
-        plan = floor_plan(names, points, [(a, b) for a, b, *_ in data["links"]])
+    if not names:
+        return {"plan": None, "names": (), "spoken": None, "heat": None}
+    points = [(place["x"], place["y"]) for place in data["places"]]
+    plan = floor_plan(names, points, [(a, b) for a, b, *_ in data["links"]])
+    # Few places: the words are shown as small maps, one in each place, as far as one can read them.
+    are_many = len(names) > (_MOST_CELLS if data["grid"] else _MOST_BOXES)
     return {
         "plan": plan,
         "names": names,
-        "spoken": plan and _spoken(data, names, plan),
-        "heat": plan and heat and heat.most and heat_map(heat, names, plan.links),
+        "spoken": _spoken(data, names, plan) if data["pair"] and are_many else None,
+        "heat": heat_map(heat, names, plan.links) if heat and heat.most else None,
     }
 
 
-def _spoken(data: Mapping[str, Any], names: Sequence[str], plan: FloorPlan) -> Any:
+def _spoken(data: Mapping[str, Any], names: Sequence[str], plan: FloorPlan) -> dict[str, Any]:
     """The words on a floor plan while the first thing is where it starts."""
-    # Few places: the words are shown as small maps, one in each place, as far as one can read them.
-    if data["pair"] is None or len(names) <= (_MOST_CELLS if data["grid"] else _MOST_BOXES):
-        return None
     (one, two), start = data["pair"]["things"], data["pair"]["start"]
     spots = [{"look": "unmapped", "title": name, "text": ""} for name in names]
     for facts, word in zip(data["states"][: data["mapped"]], data["state_words"], strict=False):

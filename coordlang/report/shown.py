@@ -6,7 +6,7 @@ Candidate tasks are drawn at random if they are many.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
@@ -90,28 +90,35 @@ def select_tasks(
         _examined(p.name, language_in_task(language, domain, p, options, position))
         for p in problems
     ]
+    candidates = _candidates(given[0].language, domain, problems[0], Random(seed), position)
     known = {describe(task.language.space, task.language.task) for task in given}
     room = number - len(given)
-    requiring: list[ShownTask] = []
-    others: list[ShownTask] = []
-    complete = True
-    for candidate in _candidates(given[0].language, domain, problems[0], Random(seed), position):
-        examined = len(requiring) + len(others)
-        enough = len(requiring) >= round(room * _REQUIRING) and examined >= room
-        if enough or examined >= _TRIES * room:
-            complete = False
-            break
-        if (text := describe(candidate.space, candidate.task)) not in known:
-            known.add(text)
-            task = _examined(None, candidate)
-            (others if task.witness is None else requiring).append(task)
-    kept = [*requiring[: max(round(room * _REQUIRING), room - len(others))], *others][:room]
-    examined = len(requiring) + len(others)
-    found = Selection((*given, *kept), examined, len(requiring), complete and examined <= room)
+    wanted = round(room * _REQUIRING)
+    requiring, others, complete = _looked_at(candidates, known, room, wanted)
+    kept = [*requiring[: max(wanted, room - len(others))], *others][:room]
+    looked = len(requiring) + len(others)
+    found = Selection((*given, *kept), looked, len(requiring), complete and looked <= room)
     if found.complete and language.provenance.tasks.get("kind") == "all":  # of listed states
         count = int(language.provenance.tasks.get("count", 0))
         return replace(found, complete=len(found.tasks) - found.others >= count)
     return found
+
+
+def _looked_at(
+    candidates: Iterable[TaskLanguage], known: set[str], room: int, wanted: int
+) -> tuple[list[ShownTask], list[ShownTask], bool]:
+    """Tasks that require coordination and others, until there are enough; whether these are all."""
+    requiring, others = list[ShownTask](), list[ShownTask]()
+    for candidate in candidates:
+        looked = len(requiring) + len(others)
+        enough = len(requiring) >= wanted and looked >= room
+        if enough or looked >= _TRIES * room:
+            return requiring, others, False
+        if (text := describe(candidate.space, candidate.task)) not in known:
+            known.add(text)
+            task = _examined(None, candidate)
+            (others if task.witness is None else requiring).append(task)
+    return requiring, others, True
 
 
 def _examined(name: str | None, language: TaskLanguage) -> ShownTask:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -40,10 +40,13 @@ _VERIFIED = 20_000
 
 
 class Tables:
-    """States and labels that the page mentions, numbered in the order of their first mention."""
+    """States and labels that the page mentions, in the order of their first mention.
 
-    def __init__(self, robots: int) -> None:
-        self.states: dict[str, int] = {}
+    ``states`` are mentioned already, by their keys.
+    """
+
+    def __init__(self, robots: int, states: Sequence[str]) -> None:
+        self.states = {key: number for number, key in enumerate(states)}
         self.labels: list[dict[str | None, int]] = [{None: 0} for _ in range(robots)]
 
     def state(self, key: str) -> int:
@@ -148,19 +151,7 @@ def _witness_data(
     """
     if witness is None:
         return None
-    space, model = language.space, language.model
-    why: str | None = witness.reason
-    together, reaches = list(witness.mixed_states), False
-    if not model.is_asynchronous:  # else nobody does them step by step
-        mixed = (
-            [own[robot] for robot, own in enumerate(step)]
-            for step in zip(*witness.plans, strict=True)
-        )
-        init = space.rows[space.state[language.start]]
-        rows, _, why = carried_out(model, init, filter(None, map(model.numbers, mixed)))
-        together = [*map(model.codec.key, rows)]
-        goal = space.goals[space.goal[language.start]]
-        reaches = why is None and bool(model.holds(goal, rows[-1][None, :])[0])
+    together, why, reaches = _together(language, witness)
     return {
         "plans": [
             [[tables.label(robot, text) for robot, text in enumerate(step)] for step in plan]
@@ -174,6 +165,24 @@ def _witness_data(
         "why": why,
         "reaches": reaches,
     }
+
+
+def _together(
+    language: TaskLanguage, witness: Miscoordination
+) -> tuple[Sequence[str], str | None, bool]:
+    """The states of the mixture, why its next step is not applicable, and if it reaches the goal.
+
+    It goes on after the step that breaks, except where nobody does plans step by step.
+    """
+    space, model = language.space, language.model
+    if model.is_asynchronous:
+        return witness.mixed_states, witness.reason, False
+    steps = zip(*witness.plans, strict=True)
+    mixed = ([own[robot] for robot, own in enumerate(step)] for step in steps)
+    init, goal = space.rows[space.state[language.start]], space.goals[space.goal[language.start]]
+    rows, _, why = carried_out(model, init, filter(None, map(model.numbers, mixed)))
+    reaches = why is None and bool(model.holds(goal, rows[-1][None, :])[0])
+    return [*map(model.codec.key, rows)], why, reaches
 
 
 def task_summary(language: TaskLanguage, world: World) -> dict[str, Any]:

@@ -47,10 +47,11 @@ class World:
         """Return the role of an atom; ``("other",)`` for what is no fact of the model."""
         return self.roles.get(text, _OTHER)
 
-    def located(self, texts: Iterable[str]) -> dict[str, str]:
-        """Return the places of the things that some atoms locate, in the order of `things`."""
+    def located(self, texts: Iterable[str], among: Iterable[str] | None = None) -> dict[str, str]:
+        """Return the places of the things (or those ``among`` some) that atoms locate, in order."""
         found = {role[1]: role[2] for role in map(self.role, texts) if role[0] == "at"}
-        return {thing: found[thing] for thing in self.things if thing in found}
+        things = self.things if among is None else among
+        return {thing: found[thing] for thing in things if thing in found}
 
     def moves(self, model: JointModel, robot: int, label: int) -> tuple[tuple[str, str], ...]:
         """Return where a robot's subaction always brings things: pairs (thing, place)."""

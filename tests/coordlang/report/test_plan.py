@@ -92,7 +92,7 @@ def test_heat_is_that_of_the_definition(domain: str, problem: str) -> None:
 def test_no_heat_is_drawn_where_no_robot_is_torn() -> None:
     """In ``domains/vans`` the driver sits in one of two vans: the plans part, and no robot does."""
     places = [{"name": name, "x": x, "y": 0} for x, name in enumerate("ab")]
-    data = {"places": places, "links": [(0, 1)], "pair": None}
+    data = {"places": places, "links": [(0, 1)], "pair": None, "grid": False}
     for after, top in (([{}, {}], None), ([{"r1": "a"}, {"r1": "b"}], "a (1) and a – b (1)")):
         heat = drawn_plan(data, counted_heat([({"r1": "a"}, after)], 1, every=True))["heat"]
         assert (heat["top"] if heat else None) == top
