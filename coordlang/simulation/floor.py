@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 
 from coordlang.sites.coordinates import Point, from_names
 from coordlang.sites.world import World
-from planners.system.errors import BadInput, UsageError
+from planners.system.errors import BadInput
 
 #: A wall: (x, y) of one end, (x, y) of the other, in metres.
 Wall = tuple[float, float, float, float]
@@ -46,17 +46,6 @@ class Floor:
         moves = (link.ends for link in world.links if link.moves)
         lengths = [math.dist(self.points[a], self.points[b]) for a, b in moves]
         self.longest, self.shortest = max(lengths, default=0.0), min(lengths, default=math.inf)
-
-
-def require_room(floor: Floor, radius: float) -> None:
-    """Raise `UsageError` if robots of this radius, in metres, are too large for the floor."""
-    most = MOST_RADIUS * floor.shortest
-    if radius > most:
-        raise UsageError(
-            f"robots with a radius of {radius:g} m are too large for places {floor.shortest:g} m "
-            "apart: they touch where one leaves a place at a right angle to the one that comes",
-            remedy=f"Their radius may be {most:g} at most.",
-        )
 
 
 def outlines(walls: Sequence[Wall]) -> list[list[Point]]:
@@ -98,19 +87,21 @@ def _points(
 
 def _walls(points: Mapping[str, Point], links: Sequence[tuple[str, str]]) -> tuple[Wall, ...]:
     """The sides of the cells of a grid that no link crosses; none where places are no cells."""
-    cells = {point: name for name, point in points.items()}
-    if any(value != int(value) for point in cells for value in point):
+    if not _are_cells(points, links):
         return ()
-    if any(math.dist(points[a], points[b]) != 1 for a, b in links):
-        return ()
-    found = []
+    cells, found = {point: name for name, point in points.items()}, []
     for (is_upright, line), begins in _closed_sides(cells, links).items():
         ends = {begin + 2 for begin in begins}
         for begin, end in zip(sorted(begins - ends), sorted(ends - begins), strict=True):
             # Whole micrometres, so that equal lengths are equal numbers.
-            at, low, high = (round(half / 2, 6) for half in (line, begin, end))
+            at, low, high = round(line / 2, 6), round(begin / 2, 6), round(end / 2, 6)
             found.append((at, low, at, high) if is_upright else (low, at, high, at))
     return tuple(sorted(found))
+
+
+def _are_cells(points: Mapping[str, Point], links: Sequence[tuple[str, str]]) -> bool:
+    is_whole = all(value == int(value) for point in points.values() for value in point)
+    return is_whole and all(math.dist(points[a], points[b]) == 1 for a, b in links)
 
 
 def _closed_sides(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -224,7 +225,6 @@ def _wrong(record: SimulationRecord, run: RunRecord) -> str | None:
     named = {step.robot for step in run.steps}.union(*(event.robots for event in run.events))
     if not named <= {*record.robots}:
         return "it speaks of robots that are not listed"
-    points = [(x, y) for poses in run.poses.values() for x, y, _ in poses]
-    if not all(abs(x) < _LARGEST and abs(y) < _LARGEST for x, y in points):
+    if any(max(abs(x), abs(y)) >= _LARGEST for x, y, _ in chain(*run.poses.values())):
         return f"poses lie between {-_LARGEST:g} and {_LARGEST:g}"
     return None

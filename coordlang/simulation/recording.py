@@ -26,6 +26,10 @@ Image = NDArray[np.uint8]
 #: Okabe and Ito's colours (2008), distinguishable with every kind of colour vision.
 ROBOTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _PLACE, _GRID, _WALL, _ALARM = "#f4f4f4", "#d9d9d9", "#444444", "#c1121f"
+#: The events that are marked among the steps of robots, and how.
+_MARKS = {"collision": ("X", _ALARM)} | dict.fromkeys(
+    ("stopped", "missed", "detour"), ("v", "black")
+)
 #: Seconds for which an event is written below the floor.
 _SHOWN = 3.0
 #: Frames a second, seconds of the run in a frame, and pixels an inch.
@@ -215,9 +219,8 @@ def _timeline(axes: Axes, record: SimulationRecord, run: RunRecord, times: Seque
             linewidth=0,
         )
     for event in run.events:
-        if event.kind in ("collision", "stopped", "missed", "detour"):
-            bad = event.kind == "collision"
-            marker, colour = ("X", _ALARM) if bad else ("v", "black")
+        if event.kind in _MARKS:
+            marker, colour = _MARKS[event.kind]
             look: dict[str, Any] = {"marker": marker, "color": colour, "linestyle": "none"}
             rows = [row[name] for name in event.robots]
             axes.plot([event.time] * len(rows), rows, markersize=6, **look)

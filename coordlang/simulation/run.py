@@ -11,7 +11,7 @@ from random import Random
 from typing import Any
 
 from coordlang.language.candidates import describe
-from coordlang.simulation.floor import Floor, require_room
+from coordlang.simulation.floor import Floor
 from coordlang.simulation.record import (
     FORMAT,
     VERSION,
@@ -43,9 +43,8 @@ def runs_of(
 
     ``floor`` has the places of the mission's world; ``wishes`` are what robots come to want on the
     way.  The same seed gives the same run; O(robots * ticks).  Raises `UsageError` if ir-sim is not
-    installed, or the robots are too large for the floor.
+    installed.
     """
-    require_room(floor, settings.radius)
     for further in range(number):
         going = _Going(mission, floor, settings, seed + further, wishes)
         while not going.has_ended:
@@ -196,12 +195,14 @@ class _Going:
         ahead: float | None = math.inf
         if self.settings.lidar:
             ahead = self.simulator.ahead(name) if robot.looks_ahead else None
-        wanted: list[WishRecord] = []
-        if robot.chooses_next:
-            wanted = [one for one in self.wishes if one.robot == name and one.step <= robot.done]
-            self.wishes = [one for one in self.wishes if one not in wanted]
-        visits = tuple(wish.visit for wish in wanted)
-        return Sensed(self.time, (x, y, heading), ahead, heard, visits)
+        wanted = self._wanted(robot) if robot.chooses_next else ()
+        return Sensed(self.time, (x, y, heading), ahead, heard, wanted)
+
+    def _wanted(self, robot: Robot) -> tuple[str, ...]:
+        """What a robot has come to want by now, and was not told yet."""
+        own = [one for one in self.wishes if one.robot == robot.name and one.step <= robot.done]
+        self.wishes = [one for one in self.wishes if one not in own]
+        return tuple(wish.visit for wish in own)
 
     def _see_collisions(self) -> None:
         touching = self.simulator.touching()

@@ -59,7 +59,8 @@ class Mission:
         path = space.nodes_on(task_language.start, space.first_path(task_language.start))
         states = [model.codec.decode(space.rows[space.state[node]]) for node in path]
         self.world = find_world(model, states)
-        self.starts, self.goals = (_robots_in(self.world, model.robots, states[k]) for k in (0, -1))
+        self.starts = self.world.located(states[0], model.robots)
+        self.goals = self.world.located(states[-1], model.robots)
         if lost := [name for name in model.robots if name not in self.starts]:
             raise BadInput(
                 f"no atom says where {' and '.join(lost)} {'is' if len(lost) == 1 else 'are'} at "
@@ -67,7 +68,7 @@ class Mission:
                 remedy="Simulate a domain whose robots move from place to place.",
             )
         self._at = {
-            number: _robots_in(self.world, model.robots, model.codec.decode(space.rows[number]))
+            number: self.world.located(model.codec.decode(space.rows[number]), model.robots)
             for number in sorted(set(space.state.tolist()))
         }
         _note_what_is_left_out(self.world, model.robots, self._at.values())
@@ -200,11 +201,6 @@ def _note_what_is_left_out(
                     "robots share no place.",
                 )
                 return
-
-
-def _robots_in(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[str, str]:
-    located = world.located(state)
-    return {name: located[name] for name in robots if name in located}
 
 
 def _leads(world: World, space: PlanSpace, robot: int) -> dict[str, str]:
