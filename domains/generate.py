@@ -17,7 +17,6 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import groupby
 from pathlib import Path
 from typing import Literal
 
@@ -96,7 +95,7 @@ def problem_text(task: Scenario, domain: str, style: Style = "agents") -> str:
     return grid_problem_text(
         task.name,
         domain,
-        [list(row) for _, row in groupby(grid.cells, key=lambda name: grid.cells[name][0])],
+        grid.cells,
         grid.neighbours,
         task.starts,
         task.goals,

@@ -192,15 +192,14 @@ def _pair(
 
 def _role(fact: str, world: World) -> list[Any]:
     """The role of an atom that is shown on the map, with things and places as numbers."""
-    kind, *rest = world.role(fact)
-    things, places = world.things, world.places
-    match kind, rest:
-        case "at", [thing, place]:
-            return ["at", things.index(thing), places.index(place)]
-        case "with", [one, two]:
-            return ["with", things.index(one), things.index(two)]
-        case "mark", [place, text]:
-            return ["mark", places.index(place), text]
+    thing, place = world.things.index, world.places.index
+    match world.role(fact):
+        case "at", what, where:
+            return ["at", thing(what), place(where)]
+        case "with", one, two:
+            return ["with", thing(one), thing(two)]
+        case "mark", where, text:
+            return ["mark", place(where), text]
     return ["other"]
 
 
@@ -305,18 +304,13 @@ def make_report(
     if data["places"]:
         heat = heat_of(language, domain, problems, options, selection, position)
     while len(html := _render({**shown, **drawn_plan(data, heat)}, data)) > LARGEST:
-        selection = _halved(selection, len(html))
+        if len(selection.tasks) == 1:
+            what = f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}"
+            raise OutOfMemory(what, remedy="Give a smaller problem.")
+        half = selection.tasks[: len(selection.tasks) // 2]
+        selection = replace(selection, tasks=half, complete=False)
         data = page_data(language, selection, seed, points)
     return Report(html, language, selection)
-
-
-def _halved(selection: Selection, size: int) -> Selection:
-    """Half of the tasks of a page of so many bytes."""
-    if len(selection.tasks) == 1:
-        what = f"the page of one task would have {size:,} bytes, more than {LARGEST:,}"
-        raise OutOfMemory(what, remedy="Give a smaller problem.")
-    half = selection.tasks[: len(selection.tasks) // 2]
-    return replace(selection, tasks=half, complete=False)
 
 
 def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:

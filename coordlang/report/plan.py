@@ -240,30 +240,22 @@ def _labels(
     """Each name where it crosses the fewest links, on nothing else that is drawn."""
     taken: list[_Box] = [(x - radius, y - radius, x + radius, y + radius) for x, y in points]
     for place in sorted(range(len(names)), key=lambda p: bool(_NUMBERED.fullmatch(names[p]))):
-        free = [
-            (sum(_crosses(box, points[a], points[b]) for a, b in links), box, label)
-            for box, label in _beside(names[place], points[place], radius + 4)
-            if _is_inside(box, height) and not any(_overlap(box, other) for other in taken)
-        ]
+        (x, y), wide, gap = points[place], _LETTER * len(names[place]), radius + 4
+        free = []
+        for at, base, anchor, left in (
+            (x + gap, y + 4, "start", x + gap),
+            (x - gap, y + 4, "end", x - gap - wide),
+            (x, y - gap, "middle", x - wide / 2),
+            (x, y + gap + 9, "middle", x - wide / 2),
+        ):
+            box = left, base - _LINE + 3, left + wide, base + 3
+            if _is_inside(box, height) and not any(_overlap(box, other) for other in taken):
+                crossed = sum(_crosses(box, points[a], points[b]) for a, b in links)
+                free.append((crossed, box, Label(names[place], at, base, anchor)))
         if free:
             _, box, label = min(free, key=itemgetter(0))
             taken.append(box)
             yield label
-
-
-def _beside(name: str, point: Point, gap: float) -> list[tuple[_Box, Label]]:
-    """Where a name may stand: to the right of its place, to the left, above, below."""
-    (x, y), wide = point, _LETTER * len(name)
-    ways = [
-        (x + gap, y + 4, "start", x + gap),
-        (x - gap, y + 4, "end", x - gap - wide),
-        (x, y - gap, "middle", x - wide / 2),
-        (x, y + gap + 9, "middle", x - wide / 2),
-    ]
-    return [
-        ((left, base - _LINE + 3, left + wide, base + 3), Label(name, at, base, anchor))
-        for at, base, anchor, left in ways
-    ]
 
 
 def _is_inside(box: _Box, height: float) -> bool:

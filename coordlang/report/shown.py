@@ -82,10 +82,8 @@ def select_tasks(
     `ProvedImpossible` if a problem cannot be solved.
     """
     if len(problems) > number:
-        raise UsageError(
-            f"{len(problems)} problems are given and {number} tasks are to be shown",
-            remedy="Give fewer problems.",
-        )
+        what = f"{len(problems)} problems are given and {number} tasks are to be shown"
+        raise UsageError(what, remedy="Give fewer problems.")
     given = [
         _examined(p.name, language_in_task(language, domain, p, options, position))
         for p in problems

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -151,7 +152,16 @@ def _witness_data(
     """
     if witness is None:
         return None
-    together, why, reaches = _together(language, witness)
+    space, model = language.space, language.model
+    why: str | None = witness.reason
+    together, reaches = list(witness.mixed_states), False
+    if not model.is_asynchronous:  # else nobody does them step by step
+        parts = [map(itemgetter(robot), plan) for robot, plan in enumerate(witness.plans)]
+        steps = filter(None, map(model.numbers, zip(*parts, strict=True)))
+        rows, _, why = carried_out(model, space.rows[space.state[language.start]], steps)
+        together = [*map(model.codec.key, rows)]
+        goal = space.goals[space.goal[language.start]]
+        reaches = why is None and bool(model.holds(goal, rows[-1][None, :])[0])
     return {
         "plans": [
             [[tables.label(robot, text) for robot, text in enumerate(step)] for step in plan]
@@ -165,24 +175,6 @@ def _witness_data(
         "why": why,
         "reaches": reaches,
     }
-
-
-def _together(
-    language: TaskLanguage, witness: Miscoordination
-) -> tuple[Sequence[str], str | None, bool]:
-    """The states of the mixture, why its next step is not applicable, and if it reaches the goal.
-
-    It goes on after the step that breaks, except where nobody does plans step by step.
-    """
-    space, model = language.space, language.model
-    if model.is_asynchronous:
-        return witness.mixed_states, witness.reason, False
-    steps = zip(*witness.plans, strict=True)
-    mixed = ([own[robot] for robot, own in enumerate(step)] for step in steps)
-    init, goal = space.rows[space.state[language.start]], space.goals[space.goal[language.start]]
-    rows, _, why = carried_out(model, init, filter(None, map(model.numbers, mixed)))
-    reaches = why is None and bool(model.holds(goal, rows[-1][None, :])[0])
-    return [*map(model.codec.key, rows)], why, reaches
 
 
 def task_summary(language: TaskLanguage, world: World) -> dict[str, Any]:

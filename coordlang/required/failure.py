@@ -215,16 +215,15 @@ class FailureCount:
         edges = self.space.out_edges(node)
         if not edges:
             return {self._front(word, -1): tuple((1, END) for _ in robots)}
-        moves: dict[int, list[dict[int, list[Multiple]]]] = {}
+        moves = defaultdict[int, list[dict[int, list[Multiple]]]](
+            lambda: [defaultdict(list) for _ in robots]
+        )
         for edge in edges:
             target, labels = self._targets[edge], self._labels[edge]
             is_new = self._word[target] != word
             for rest, plans in said[target].items():
                 sentence = self._front(word, rest) if is_new else rest
-                own = moves.get(sentence)
-                if own is None:
-                    own = moves[sentence] = [defaultdict(list) for _ in robots]
-                for mine, label, part in zip(own, labels, plans, strict=True):
+                for mine, label, part in zip(moves[sentence], labels, plans, strict=True):
                     mine[label].append(part)
         self._check()
         return {sentence: tuple(map(self._sets.of_moves, own)) for sentence, own in moves.items()}

@@ -12,6 +12,8 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from coordlang.sites.coordinates import Point, from_names
 from coordlang.sites.world import World
 from planners.system.errors import BadInput
@@ -35,13 +37,10 @@ class Floor:
     """
 
     def __init__(self, world: World, known: Mapping[str, Point]) -> None:
-        links = tuple(sorted({link.ends for link in world.links}))
+        links = [link.ends for link in world.links]
         points = _points(world.places, links, known)
-        top = max((y for _, y in points.values()), default=0.0)
-        left = min((x for x, _ in points.values()), default=0.0)
-        self.points: dict[str, Point] = {
-            name: (x - left, top - y) for name, (x, y) in points.items()
-        }
+        top, left = max(y for _, y in points.values()), min(x for x, _ in points.values())
+        self.points = {name: (x - left, top - y) for name, (x, y) in points.items()}
         self.walls = _walls(points, links)
         moves = (link.ends for link in world.links if link.moves)
         lengths = [math.dist(self.points[a], self.points[b]) for a, b in moves]
@@ -87,7 +86,8 @@ def _points(
 
 def _walls(points: Mapping[str, Point], links: Sequence[tuple[str, str]]) -> tuple[Wall, ...]:
     """The sides of the cells of a grid that no link crosses; none where places are no cells."""
-    if not _are_cells(points, links):
+    is_off_grid = (np.array([*points.values()]) % 1).any()
+    if is_off_grid or any(math.dist(points[a], points[b]) != 1 for a, b in links):
         return ()
     cells, found = {point: name for name, point in points.items()}, []
     for (is_upright, line), begins in _closed_sides(cells, links).items():
@@ -97,11 +97,6 @@ def _walls(points: Mapping[str, Point], links: Sequence[tuple[str, str]]) -> tup
             at, low, high = round(line / 2, 6), round(begin / 2, 6), round(end / 2, 6)
             found.append((at, low, at, high) if is_upright else (low, at, high, at))
     return tuple(sorted(found))
-
-
-def _are_cells(points: Mapping[str, Point], links: Sequence[tuple[str, str]]) -> bool:
-    is_whole = all(value == int(value) for point in points.values() for value in point)
-    return is_whole and all(math.dist(points[a], points[b]) == 1 for a, b in links)
 
 
 def _closed_sides(

@@ -76,8 +76,7 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
     ] = None
     steps: Annotated[dict[str, int], doc("How many steps each robot has done by then.")] = {}
     words: Annotated[
-        dict[str, int],
-        doc("How many words of the sentence each robot has passed, as it believes."),
+        dict[str, int], doc("How many words of the sentence each robot has passed, as it believes.")
     ] = {}
     places: Annotated[
         dict[str, list[str]],
@@ -129,8 +128,7 @@ class RunRecord(msgspec.Struct, frozen=True):
         doc("Robot -> its poses, one each ``interval``: x, y (metres), heading."),
     ]
     nearest: Annotated[
-        float | None,
-        doc("The least distance of two robots' middles in metres; null: no two."),
+        float | None, doc("The least distance of two robots' middles in metres; null: no two.")
     ] = None
 
 
@@ -187,11 +185,9 @@ def read_simulation(path: str | Path) -> SimulationRecord:
     record = SIMULATION.decode(read_bytes(path), position)
     for run in record.runs:
         if wrong := _wrong(record, run):
-            raise BadInput(
-                f"the run with seed {run.seed}: {wrong}",
-                position=position,
-                remedy="Write the record again: `coordlang simulate .. -o FILE.json`.",
-            )
+            remedy = "Write the record again: `coordlang simulate .. -o FILE.json`."
+            what = f"the run with seed {run.seed}: {wrong}"
+            raise BadInput(what, position=position, remedy=remedy)
     return record
 
 

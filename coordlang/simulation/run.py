@@ -234,9 +234,8 @@ class _Going:
 
     def _places(self, name: str) -> list[str]:
         """The place of a robot; under way the place that it leaves and the one ahead."""
-        been = [self.mission.starts[name]]
-        underway: list[str] = []
+        places = [self.mission.starts[name]]
         for step in self.robots[name].steps:
             if step.place is not None:
-                (been if step.end is not None else underway).append(step.place)
-        return [been[-1], *underway]
+                places = [places[-1], step.place] if step.end is None else [step.place]
+        return places

@@ -144,12 +144,7 @@ def _environment(world: dict[str, Any], seed: int) -> Any:
 
 def _world(floor: Floor, poses: Mapping[str, Pose], settings: Settings) -> dict[str, Any]:
     spread = settings.noise**2
-    lidar = {
-        "type": "lidar2d",
-        "range_max": 2,
-        "angle_range": _ANGLE,
-        "number": _BEAMS,
-    }
+    lidar = {"type": "lidar2d", "range_max": 2, "angle_range": _ANGLE, "number": _BEAMS}
     robots = [
         {
             "name": name,

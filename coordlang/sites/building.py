@@ -151,8 +151,7 @@ class _Vertex:
 
     def robots(self) -> list[str]:
         """The robots that start here, as the file calls them."""
-        named = [_text(params, "spawn_robot_name") for params in self.params]
-        return [robot for robot in named if robot]
+        return [*filter(None, (_text(params, "spawn_robot_name") for params in self.params))]
 
 
 class _Level:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import textwrap
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, count, islice
@@ -117,20 +118,15 @@ def building_files(
     and robots that start or end too near each other.
     """
     if clearance > 0 and building.unscaled:
-        raise UsageError(
-            f"--clearance {clearance:g}: {named(building.unscaled)} has no measurement",
-            remedy="Add one in traffic editor: metres are not known without.",
-        )
+        what = f"--clearance {clearance:g}: {named(building.unscaled)} has no measurement"
+        remedy = "Add one in traffic editor: metres are not known without."
+        raise UsageError(what, remedy=remedy)
     team = _started(building, robots, clearance)
     goals = _goals(building, team, tasks, clearance)
     used = _used(building, team)
     graphs = _graphs(team)
     excluding = _excluding(used, clearance)
-    domain = dict.fromkeys([*_EXCLUDING, *_GRAPHS], "")
-    if graphs:
-        domain |= _GRAPHS
-    if excluding:
-        domain |= _EXCLUDING
+    added = (_GRAPHS if graphs else {}) | (_EXCLUDING if excluding else {})
     problem = [
         *_header(building, used, clearance),
         "(define (problem building)",
@@ -150,7 +146,7 @@ def building_files(
     drawn = building.coordinates()
     coordinates = checked({name: drawn[name] for name in used.places}, Position(building.path))
     texts = {
-        "domain.pddl": _DOMAIN.format(**domain),
+        "domain.pddl": _DOMAIN.format_map(defaultdict(str, added)),
         "problem.pddl": "\n".join(problem) + "\n",
         "coordinates.json": json.dumps({"coordinates": coordinates}) + "\n",
     }
@@ -346,10 +342,9 @@ def _require_apart(
     """Raise `UsageError` for two robots that are in one place, or exclude each other there."""
     for (one, here), (other, there) in combinations(where.items(), 2):
         if _too_near(building.places[here], building.places[there], clearance):
-            raise UsageError(
-                f"{one} and {other} {verb} in {here} and {there}: not both can be there",
-                remedy="Use a smaller --clearance, or other robots and tasks.",
-            )
+            what = f"{one} and {other} {verb} in {here} and {there}: not both can be there"
+            remedy = "Use a smaller --clearance, or other robots and tasks."
+            raise UsageError(what, remedy=remedy)
 
 
 def _too_near(one: Place, other: Place, clearance: float) -> bool:

@@ -55,11 +55,9 @@ def checked(entries: Mapping[str, Point], position: Position) -> dict[str, Point
     """
     for name, point in entries.items():
         if not all(abs(value) < _LARGEST for value in point):
-            raise BadInput(
-                f"{echoed(name)}: the coordinates must be between {-_LARGEST:g} and {_LARGEST:g}",
-                position=position,
-                remedy="Scale the coordinates: only their proportions are drawn.",
-            )
+            what = f"the coordinates must be between {-_LARGEST:g} and {_LARGEST:g}"
+            remedy = "Scale the coordinates: only their proportions are drawn."
+            raise BadInput(f"{echoed(name)}: {what}", position=position, remedy=remedy)
     points = {name.lower(): point for name, point in entries.items()}
     if len(points) < len(entries):
         what = "a place occurs twice, in upper and in lower case"

@@ -106,12 +106,11 @@ def read_agents(path: Path, grid: MovingMap, agents: int) -> tuple[Agent, ...]:
         for what, cell in zip(("start", "goal"), agent, strict=True):
             before = taken.setdefault((what, cell), number)
             if before != number:
-                raise _wrong(
-                    f"two robots have the {what} {cell_name(cell)} (the other one: line {before})",
-                    "No two robots can be in one cell: leave one of the lines out.",
-                    path,
-                    number,
+                said = (
+                    f"two robots have the {what} {cell_name(cell)} (the other one: line {before})"
                 )
+                remedy = "No two robots can be in one cell: leave one of the lines out."
+                raise _wrong(said, remedy, path, number)
         found.append(agent)
     return tuple(found)
 
@@ -130,7 +129,7 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
     text = grid_problem_text(
         name if name[:1].isalpha() else f"map-{name}",
         "grid",
-        [list(row) for _, row in groupby(grid.cells, key=lambda name: grid.cells[name][0])],
+        grid.cells,
         grid.near,
         [cell_name(start) for start, _ in found],
         [cell_name(goal) for _, goal in found],
@@ -148,7 +147,7 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
 def grid_problem_text(
     name: str,
     domain: str,
-    rows: Sequence[Sequence[str]],
+    cells: Mapping[str, Cell],
     neighbours: Callable[[str], Sequence[str]],
     starts: Sequence[str],
     goals: Sequence[str],
@@ -158,12 +157,13 @@ def grid_problem_text(
 ) -> str:
     """Write a problem of the grid domain, in which robot number k is ``r{k+1}``.
 
-    ``rows`` are the cells, row by row; ``neighbours`` gives those adjacent to a cell, in the order
-    in which they are written.  Without ``declare_robots`` robots are constants of the domain.
+    ``cells`` come row by row; ``neighbours`` gives those adjacent to a cell, in the order in which
+    they are written.  Without ``declare_robots`` robots are constants of the domain.
     """
     robots = [f"r{number}" for number in range(1, len(starts) + 1)]
-    listed = ["    " + " ".join(names) for names in rows]
-    near = ((cell, neighbours(cell)) for names in rows for cell in names)
+    rows = groupby(cells, key=lambda name: cells[name][0])
+    listed = ["    " + " ".join(names) for _, names in rows]
+    near = ((cell, neighbours(cell)) for cell in cells)
     lines = [
         f"; Written by {written_by}.",
         f"(define (problem {name})",

@@ -7,7 +7,7 @@ It is found from the actions and the static atoms of the model alone, see `_loca
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import permutations
 
@@ -84,7 +84,7 @@ def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
     return World(
         things=(*model.robots, *others),
         places=tuple(sorted(places, key=natural)),
-        links=tuple(_links(model, locations, places)),
+        links=_links(model, locations, places),
         roles=roles,
     )
 
@@ -157,17 +157,13 @@ def _other_role(atom: Atom, places: frozenset[str], things: set[str]) -> Role:
 
 def _links(
     model: JointModel, locations: Sequence[_Reading], places: frozenset[str]
-) -> Iterator[Link]:
+) -> tuple[Link, ...]:
     """What moves join, and what static atoms with two places relate."""
-    moves = {pair for reading in locations for pair in reading.moves if places.issuperset(pair)}
-    moved = {tuple(sorted(pair)) for pair in moves}
-    related = {
-        tuple(sorted(pair))
-        for atom in model.statics
-        if len(pair := {arg for arg in atom.args if arg in places}) == 2
-    }
-    for first, second in sorted(moved | related):
-        yield Link((first, second), (first, second) in moved)
+    moves = {frozenset(pair) for reading in locations for pair in reading.moves}
+    moved = {ends for ends in moves if ends <= places}
+    related = {places.intersection(atom.args) for atom in model.statics}
+    pairs = sorted((min(e), max(e), e in moved) for e in moved | related if len(e) == 2)
+    return tuple(Link((first, second), moves) for first, second, moves in pairs)
 
 
 @dataclass(eq=False, slots=True)

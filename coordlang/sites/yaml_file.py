@@ -147,13 +147,10 @@ def _no_yaml(said: str, file: str, mark: yaml.Mark | None) -> BadInput:
 
 
 def _require_plain(text: str, file: str) -> None:
-    """Raise `BadInput` for what no plain data of one document has."""
-    depth = number = documents = 0
+    """Raise `BadInput` for what no plain data has."""
+    depth = number = 0
     for event in yaml.parse(text, _LOADER):
         depth -= isinstance(event, yaml.CollectionEndEvent)
-        documents += isinstance(event, yaml.DocumentStartEvent)
-        if documents > 1:
-            raise _no_yaml("but found another document", file, event.start_mark)
         if isinstance(event, yaml.NodeEvent):
             number += 1
             if what := _refused(event, depth + 1, number):
