@@ -179,10 +179,9 @@ def _pair(
     """Two things whose places alone tell the states apart, and where they start; None if not."""
     located = [world.located(state) for state in states]
     pairs = {tuple(at) for at in located}
-    if len(pairs) != 1 or len({tuple(at.values()) for at in located}) < len(located):
+    if [*map(len, pairs)] != [2] or len({tuple(at.values()) for at in located}) < len(located):
         return None
-    if len(things := pairs.pop()) != 2:
-        return None
+    (things,) = pairs
     at = world.located(start)
     return {
         "things": [world.things.index(thing) for thing in things],

@@ -155,11 +155,9 @@ def heat_map(heat: Heat, names: Sequence[str], links: Sequence[tuple[int, int]])
 
 def _scale(bounds: Sequence[int]) -> list[tuple[str, str]]:
     """The look of each class, and which numbers are in it."""
-    scale = [("h0", "0")]
-    for number, (below, high) in enumerate(pairwise(bounds), 1):
-        span = f"{high:,}" if below + 1 == high else f"{below + 1:,} to {high:,}"
-        scale.append((f"h{number}", span))
-    return scale
+    pairs = [(below + 1, high) for below, high in pairwise(bounds)]
+    spans = [f"{low:,}" if low == high else f"{low:,} to {high:,}" for low, high in pairs]
+    return [(f"h{number}", span) for number, span in enumerate(["0", *spans])]
 
 
 def _looks(known: Iterable[tuple[str, int]], bounds: Sequence[int]) -> list[dict[str, str]]:

@@ -141,13 +141,6 @@ class LabelSets:
             result[open_groups] = of_each_row(rows, self._extended)
         return result
 
-    def within_each(self, one: Ints, other: Ints) -> Bools:
-        """For each pair whether ``one[k]`` is `within` ``other[k]``."""
-        answers: Bools = one == other
-        left = np.flatnonzero(~answers)
-        answers[left] = of_each_row(np.column_stack((one[left], other[left])), self.within)
-        return answers
-
 
 class Choices:
     """The sets ``C_i(p)`` of all nodes of a plan space, and which nodes require coordination.
@@ -257,7 +250,8 @@ class Choices:
             theirs = self.of_node[robot, mixed]
             equal &= mine == theirs
             asked = np.flatnonzero((mine != theirs) & ~fails)
-            fails[asked] = ~self.sets.within_each(mine[asked], theirs[asked])
+            pairs = np.column_stack((mine[asked], theirs[asked]))
+            fails[asked] = of_each_row(pairs, self.sets.within) == 0
         left = np.flatnonzero(~fails & self.requires[mixed])
         fails[left[equal[left]]] = True
         left = left[~equal[left]]

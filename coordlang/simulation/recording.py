@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.simulation.record import EventRecord, RunRecord, SimulationRecord, event_text
+from coordlang.simulation.record import RunRecord, SimulationRecord, event_text
 from planners.system.errors import UsageError
 from planners.system.messages import echoed
 
@@ -122,9 +122,8 @@ def frames(record: SimulationRecord, run: RunRecord) -> Iterator[Image]:
     for index in (*range(0, last, every), last):
         time = index * record.interval
         scene.show(index)
-        event = _event_at(run, time + record.interval / 2)
         above.set_text(_caption(record, run, time))
-        below.set_text(_agreed(record) + (f":  {event_text(event)}" if event else ""))
+        below.set_text(_agreed(record) + _event_at(run, time + record.interval / 2, ":  "))
         figure.canvas.draw()
         image: Image = np.asarray(figure.canvas.buffer_rgba())[:, :, :3].copy()  # type: ignore[attr-defined]
         yield from [image] * (math.ceil(_LAST * _RATE) if index == last else 1)
@@ -192,8 +191,7 @@ def _sheet(record: SimulationRecord, run: RunRecord) -> bytes:
         )
         Scene(axes, record, run).show(index)
         time = index * record.interval
-        event = _event_at(run, time + record.interval / 2)
-        text = f"{time:.1f} s" + (f"  {event_text(event)}" if event else "")
+        text = f"{time:.1f} s" + _event_at(run, time + record.interval / 2, "  ")
         axes.set_title(text, fontsize=8, loc="left", pad=2, x=0.03)
     bars = figure.add_axes((0.05, 0.42 / whole[1], 0.93, (strip - 0.2) / whole[1]))
     _timeline(bars, record, run, [index * record.interval for index in shown])
@@ -250,13 +248,13 @@ def _agreed(record: SimulationRecord) -> str:
     return f"{said[record.agreement]}, {steps.get(record.step, record.step)}"
 
 
-def _event_at(run: RunRecord, time: float) -> EventRecord | None:
-    """The last event that is still shown at a time; collisions and ends stay."""
+def _event_at(run: RunRecord, time: float, between: str) -> str:
+    """The last event that is still shown at a time, if there is one; collisions and ends stay."""
     stays = ("collision", "deadlock", "arrived")
     shown = [
         e for e in run.events if e.time <= time and (time - e.time < _SHOWN or e.kind in stays)
     ]
-    return shown[-1] if shown else None
+    return between + event_text(shown[-1]) if shown else ""
 
 
 def _bounds(record: SimulationRecord) -> tuple[tuple[float, float], tuple[float, float]]:

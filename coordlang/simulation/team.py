@@ -25,7 +25,7 @@ from coordlang.simulation.simulator import BESIDE
 from coordlang.sites.clearance import distance
 from coordlang.sites.world import World, find_world
 from planners.search.plan_space import PlanSpace
-from planners.search.plans import Plan, Plans
+from planners.search.plans import Plans
 from planners.system.errors import BadInput, UsageError, note
 from planners.system.messages import echoed, some
 
@@ -91,7 +91,7 @@ class Mission:
         agreed = self.agreement == "plan"
         team: Team = {}
         for robot, name in enumerate(self.robots):
-            fits = self._only(self._drawn(f"{seed} plan" if agreed else f"{seed} plan {name}"))
+            fits = self._drawn(f"{seed} plan" if agreed else f"{seed} plan {name}")
             words = own_words(fits, self.task_language, robot) if agreed else None
             team[name] = monitor(fits, knowing_own(fits, robot), ""), words
         return team
@@ -149,16 +149,15 @@ class Mission:
             self._plans.space.path_with(self._plans.start, found) is not None
         )
 
-    def _only(self, plan: Plan) -> PlanSpace:
-        """A plan as a plan space of its own."""
-        path = self._plans.space.path_with(self._plans.start, plan)
+    def _drawn(self, seed: str) -> PlanSpace:
+        """A plan, as a plan space of its own."""
+        plans = self._plans
+        plan = plans.unrank(Random(seed).randrange(plans.count))
+        path = plans.space.path_with(plans.start, plan)
         assert path is not None, "it was drawn from this space"
-        taken = np.zeros(len(self._plans.space.target), np.bool_)
+        taken = np.zeros(len(plans.space.target), np.bool_)
         taken[path] = True
-        return self._plans.space.along(taken)
-
-    def _drawn(self, seed: str) -> Plan:
-        return self._plans.unrank(Random(seed).randrange(self._plans.count))
+        return plans.space.along(taken)
 
 
 def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWords | None:

@@ -80,10 +80,7 @@ def _is_ruled_out(one: Motion, other: Motion) -> bool:
 
 def _near(motions: Sequence[Motion], clearance: float) -> Bools:
     """Which motions may clash with which: they have a group in common, or their boxes are near."""
-    near = np.zeros((len(motions), len(motions)), np.bool_)
-    for group in frozenset[str]().union(*(motion.groups for motion in motions)):
-        inside = [group in motion.groups for motion in motions]
-        near |= np.outer(inside, inside)
+    near = np.array([[bool(a.groups & b.groups) for b in motions] for a in motions])
     for level in {level for motion in motions for level in motion.on}:
         there = [number for number, motion in enumerate(motions) if level in motion.on]
         ends = np.array([motions[number].on[level] for number in there])

@@ -45,8 +45,7 @@ class Value:
         return isinstance(self.node, yaml.SequenceNode)
 
     @property
-    def is_empty(self) -> bool:
-        """Whether nothing is written for it."""
+    def _is_empty(self) -> bool:
         return self._plain() in _EMPTY
 
     def wrong(self, what: str, remedy: str) -> BadInput:
@@ -55,7 +54,7 @@ class Value:
 
     def mapping(self) -> dict[str, Value]:
         """The values of a mapping by their keys; none for an empty value."""
-        if self.is_empty:
+        if self._is_empty:
             return {}
         if not isinstance(self.node, yaml.MappingNode):
             raise self._not("a mapping")
@@ -70,7 +69,7 @@ class Value:
 
     def list(self, least: int = 0) -> Sequence[Value]:
         """The values of a list of at least so many; none for an empty value."""
-        if self.is_empty and not least:
+        if self._is_empty and not least:
             return ()
         if not self.is_list or len(self.node.value) < least:
             raise self._not(f"a list of {least} or more" if least else "a list")
@@ -80,7 +79,7 @@ class Value:
         """A text; a number or a flag as it is written, and nothing for an empty value."""
         if not isinstance(self.node, yaml.ScalarNode):
             raise self._not("a text")
-        return "" if self.is_empty else str(self.node.value)
+        return "" if self._is_empty else str(self.node.value)
 
     def number(self) -> float:
         """A finite decimal number."""
@@ -133,17 +132,14 @@ def read_yaml(path: Path) -> Value:
         root = yaml.compose(text, _LOADER)
     except yaml.YAMLError as error:
         said = str(getattr(error, "problem", None) or getattr(error, "reason", ""))
-        mark = getattr(error, "problem_mark", None)
-        raise _no_yaml(said, file, mark) from None
+        mark, where = getattr(error, "problem_mark", None), Position(file)
+        if mark is not None:
+            where = Position(file, mark.line + 1, mark.column + 1)
+        remedy = "Write it with traffic editor, or correct it in a text editor."
+        raise BadInput(f"this is no YAML: {said}", position=where, remedy=remedy) from None
     if root is None:
         raise BadInput("the file is empty", position=Position(file), remedy="Is it the right file?")
     return Value(file, root)
-
-
-def _no_yaml(said: str, file: str, mark: yaml.Mark | None) -> BadInput:
-    remedy = "Write it with traffic editor, or correct it in a text editor."
-    where = Position(file) if mark is None else Position(file, mark.line + 1, mark.column + 1)
-    return BadInput(f"this is no YAML: {said}", position=where, remedy=remedy)
 
 
 def _require_plain(text: str, file: str) -> None:

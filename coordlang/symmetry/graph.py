@@ -33,23 +33,21 @@ Renaming = Mapping[str, str]
 LARGEST_GRAPH = 4_000
 
 
-def automorphism_generators(
-    candidates: Candidates, largest: int = LARGEST_GRAPH, *, with_tasks: bool = True
-) -> list[Renaming]:
+def automorphism_generators(candidates: Candidates, *, with_tasks: bool = True) -> list[Renaming]:
     """Generators of the automorphisms of the model's graph, as renamings of objects.
 
     The tasks (if ``with_tasks``), or the actions, are left out of a graph that would have more than
-    ``largest`` vertices; some of the generators may then be no symmetries of the model.
+    `LARGEST_GRAPH` vertices; some of the generators may then be no symmetries of the model.
     """
     model = candidates.model
     graph = _ModelGraph(candidates)
-    if len(graph) > largest:
+    if len(graph) > LARGEST_GRAPH:
         return []
     if with_tasks:
         tasks = sum(len(np.unique(s.state[s.starts])) + len(s.goals) for s in candidates.spaces)
-        if len(graph) + tasks <= largest:
+        if len(graph) + tasks <= LARGEST_GRAPH:
             graph.add_tasks()
-    if len(graph) + len(model.actions) <= largest:
+    if len(graph) + len(model.actions) <= LARGEST_GRAPH:
         graph.add_actions()
     return graph.renamings()
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause, pair
-from coordlang.symmetry.graph import LARGEST_GRAPH, Renaming, automorphism_generators, joined_order
+from coordlang.symmetry.graph import Renaming, automorphism_generators, joined_order
 from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, Goal
 from planners.joint.states import StateCodec, split_atoms
@@ -121,18 +121,15 @@ class SymmetryGroup:
             yield frozenset(pair(to[a], to[b]) for a, b in clause), symmetry
 
 
-def symmetry_group(
-    candidates: Candidates, largest: int = LARGEST_GROUP, largest_graph: int = LARGEST_GRAPH
-) -> SymmetryGroup:
+def symmetry_group(candidates: Candidates, largest: int = LARGEST_GROUP) -> SymmetryGroup:
     """The symmetries of the candidates' model: of more than ``largest`` elements a subgroup.
 
     The identity counts among them.  It is alone under ``--remember-actions`` and where states say
-    what is left of the slack: symmetries only save work.  ``largest_graph`` bounds the vertices of
-    the graph of the model (`automorphism_generators`).
+    what is left of the slack: symmetries only save work.
     """
     if candidates.model.remembers or candidates.model.slack_facts:
         return SymmetryGroup(())
-    generators = checked_generators(candidates, largest_graph)
+    generators = checked_generators(candidates)
     if candidates.model.is_asynchronous and any(s.model.has_ties for s in candidates.spaces):
         # Robots whose events could be done in either order do them in the order of robots.
         robots = candidates.model.robots
@@ -145,11 +142,9 @@ def symmetry_group(
     return SymmetryGroup(tuple(group))
 
 
-def checked_generators(
-    candidates: Candidates, largest_graph: int = LARGEST_GRAPH, *, with_tasks: bool = True
-) -> list[Symmetry]:
+def checked_generators(candidates: Candidates, *, with_tasks: bool = True) -> list[Symmetry]:
     """Symmetries that generate the group: those automorphisms of the graph that are some."""
-    proposed = automorphism_generators(candidates, largest_graph, with_tasks=with_tasks)
+    proposed = automorphism_generators(candidates, with_tasks=with_tasks)
     if not proposed:
         return []
     itself = _renamed_model(candidates, {}, np.arange(len(candidates.rows)))
