@@ -165,9 +165,8 @@ def _map(world: World, known: Mapping[str, Point]) -> dict[str, Any]:
         return {"places": [], "links": [], "grid": False}
     placed, is_grid = place_layout(world.places, [link.ends for link in world.links], known)
     number = {name: k for k, name in enumerate(world.places)}
-    points = [(name, *placed[name]) for name in world.places]
     return {
-        "places": [{"name": name, "x": x, "y": y} for name, x, y in points],
+        "places": [{"name": name, "x": x, "y": y} for name, (x, y) in placed.items()],
         "links": [[*(number[end] for end in link.ends), int(link.moves)] for link in world.links],
         "grid": is_grid,
     }

@@ -233,8 +233,7 @@ def _own_counts(language: TaskLanguage, words: Sentence) -> list[str | None]:
     found: list[str | None] = []
     open_plans = language.plans_with(words)
     for robot in range(len(language.model.robots)):
-        try:
-            found.append(str(determinise(open_plans, robot, most=_SUBSETS).count))
-        except OutOfMemory:
-            found.append(None)
+        found.append(None)
+        with suppress(OutOfMemory):
+            found[robot] = str(determinise(open_plans, robot, most=_SUBSETS).count)
     return found

@@ -171,16 +171,9 @@ class DifferenceWalk:
     def __init__(self, space: PlanSpace) -> None:
         self._space = space
         self._layers = _walk(space)
-
-    @property
-    def nodes(self) -> int:
-        """How many nodes the walk has."""
-        return sum(len(layer.x) for layer in self._layers)
-
-    @property
-    def edges(self) -> int:
-        """How many edges the walk has."""
-        return sum(len(layer.source) for layer in self._layers)
+        #: How many nodes and edges the walk has.
+        self.nodes = sum(len(layer.x) for layer in self._layers)
+        self.edges = sum(len(layer.source) for layer in self._layers)
 
     def unseparated(
         self, word: Ints, random: np.random.Generator

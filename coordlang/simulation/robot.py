@@ -106,10 +106,8 @@ Pose = tuple[float, float, float]
 #: Metres a second ahead, radians a second to the left.
 Velocity = tuple[float, float]
 
-#: What is worth recording, its kind and further fields.  ``stopped``: something is in its way,
-#: told once in a step; ``missed``: it was late for a beginning by the clock; ``word``: it may have
-#: come to a word; ``contradicted``: it heard of an event that its choices exclude; ``detour``: it
-#: asked its choices to ``visit`` an atom, and has committed to it if that is ``granted``.
+#: What is worth recording: the kind of a `coordlang.simulation.record.EventRecord`, and further
+#: fields of it.
 Event = tuple[str, Mapping[str, object]]
 
 STANDING: Velocity = (0.0, 0.0)

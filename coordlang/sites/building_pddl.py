@@ -103,10 +103,6 @@ class Robot:
     reached: frozenset[str]
 
 
-#: The robots by their names in PDDL.
-_Team = Mapping[str, Robot]
-
-
 def building_files(
     building: Building, robots: int | Sequence[str] | None, tasks: Sequence[str], clearance: float
 ) -> tuple[dict[str, str], tuple[str, ...]]:
@@ -158,7 +154,7 @@ def unused(building: Building) -> str:
     return named([f"{name} ({number:,})" for name, number in sorted(building.unused.items())])
 
 
-def _used(building: Building, team: _Team) -> Building:
+def _used(building: Building, team: Mapping[str, Robot]) -> Building:
     """The places that robots can reach, and the lanes between them of the robots' graphs."""
     reached = frozenset[str]().union(*(robot.reached for robot in team.values()))
     graphs = {robot.graph for robot in team.values()}
@@ -167,7 +163,7 @@ def _used(building: Building, team: _Team) -> Building:
     return replace(building, places=places, lanes=tuple(lanes))
 
 
-def _graphs(team: _Team) -> list[str]:
+def _graphs(team: Mapping[str, Robot]) -> list[str]:
     """The graphs of the robots; none where all drive on the same one."""
     numbers = {robot.graph for robot in team.values()}
     return [_graph(number) for number in sorted(numbers)] if len(numbers) > 1 else []
@@ -202,7 +198,7 @@ def _header(building: Building, used: Building, clearance: float) -> Iterator[st
         )
 
 
-def _facts(building: Building, team: _Team, *, with_graphs: bool) -> Iterator[str]:
+def _facts(building: Building, team: Mapping[str, Robot], *, with_graphs: bool) -> Iterator[str]:
     """Lines of the problem: where robots start, what places are, and the lanes."""
     yield from _wrapped([f"(at {name} {robot.start})" for name, robot in team.items()])
     if with_graphs:
@@ -238,7 +234,9 @@ def _declared(names: Sequence[str], kind: str) -> Iterator[str]:
     return _wrapped([*names[:-1], f"{names[-1]} - {kind}"] if names else [])
 
 
-def _started(building: Building, asked: int | Sequence[str] | None, clearance: float) -> _Team:
+def _started(
+    building: Building, asked: int | Sequence[str] | None, clearance: float
+) -> Mapping[str, Robot]:
     """The robots that are asked for, each where it spawns, or else in a free charger or place."""
     names = _robot_names(building, asked)
     starts = {name: building.spawning[name] for name in names if name in building.spawning}
@@ -293,7 +291,7 @@ def _free(building: Building, taken: Iterable[str], clearance: float) -> str:
 
 
 def _goals(
-    building: Building, team: _Team, tasks: Sequence[str], clearance: float
+    building: Building, team: Mapping[str, Robot], tasks: Sequence[str], clearance: float
 ) -> dict[str, str]:
     """Where robots have to end, as tasks say; all where they start, if there is no task."""
     if not tasks:

@@ -222,8 +222,7 @@ def _header(path: Path, lines: Sequence[str]) -> tuple[int, int, int]:
 def _agent(path: Path, line: int, text: str, grid: MovingMap) -> Agent:
     """One line of a scenario; columns are parted by tabs, or by blanks."""
     words = text.split("\t") if "\t" in text else text.split()
-    numbers = [_natural(word.strip()) for word in words[2:8]]
-    known = [number for number in numbers if number is not None]
+    known = [n for word in words[2:8] if (n := _natural(word.strip())) is not None]
     if len(words) < 8 or len(known) < 6:
         expected = f"Expected {_COLUMNS}, parted by tabs, with whole numbers."
         raise _wrong(f"this is no line of a scenario: {echoed(text.strip())}", expected, path, line)

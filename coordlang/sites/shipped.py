@@ -18,10 +18,8 @@ def shipped_domains() -> Path:
     for place in (package / _INSTALLED, package.parent / "domains"):
         if (place / "grid" / "domain.pddl").is_file():
             return place
-    raise UsageError(
-        f"the shipped domains are missing: {package / _INSTALLED}",
-        remedy="Install coordlang again, or take the folder domains of its repository.",
-    )
+    remedy = "Install coordlang again, or take the folder domains of its repository."
+    raise UsageError(f"the shipped domains are missing: {package / _INSTALLED}", remedy=remedy)
 
 
 def domain_names(folder: Path) -> list[str]:
