@@ -87,9 +87,8 @@ class PlanTable:
         """
         _, task, _, sizes = self._sentences(word, tasks)
         squares = np.bincount(task, sizes.astype(np.float64) ** 2, minlength=len(tasks))
-        found: Floats = self.count[tasks] * (
-            1 - squares / self.plans[tasks].astype(np.float64) ** 2
-        )
+        share = squares / self.plans[tasks].astype(np.float64) ** 2
+        found: Floats = self.count[tasks] * (1 - share)
         return found
 
     def failures(self, word: Ints, tasks: Ints) -> Floats:

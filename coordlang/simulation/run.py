@@ -108,13 +108,10 @@ class _Going:
         }
         self.sensing = {name: Random(f"{seed} sensors {name}") for name in self.robots}
         self.wishes = list(wishes)
-        poses = {
-            name: (
-                *floor.points[place],
-                Random(f"{seed} heading {name}").uniform(-math.pi, math.pi),
-            )
-            for name, place in mission.starts.items()
-        }
+        poses = {}
+        for name, place in mission.starts.items():
+            heading = Random(f"{seed} heading {name}").uniform(-math.pi, math.pi)
+            poses[name] = (*floor.points[place], heading)
         self.simulator = Simulator(floor, poses, settings, seed)
         self.ticks = self.messages = self.collisions = self.changes = 0
         self.last_change, self.nearest = 0.0, math.inf

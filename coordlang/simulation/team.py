@@ -145,9 +145,8 @@ class Mission:
             own = [parts + [None] * (self.steps - len(parts)) for parts in own]
         steps = [self.task_language.model.numbers(step) for step in zip(*own, strict=True)]
         found = [step for step in steps if step is not None]
-        return len(found) == self.steps and (
-            self._plans.space.path_with(self._plans.start, found) is not None
-        )
+        path = self._plans.space.path_with(self._plans.start, found)
+        return len(found) == self.steps and path is not None
 
     def _drawn(self, seed: str) -> PlanSpace:
         """A plan, as a plan space of its own."""
