@@ -208,6 +208,14 @@ def test_one_robot_is_in_a_lift(tmp_path: Path) -> None:
     assert library.plans(*files).makespan == 3
 
 
+def test_lifts_of_one_place_come_in_order(tmp_path: Path) -> None:
+    cabins = "".join(f', [9, 0, 0, "", {{lift_cabin: [1, {name}]}}]' for name in "gaecfbd")
+    one = f"{{vertices: [[0, 0, 0, a]{cabins}], lanes: [[0, 1]]}}"
+    found = read_building(written(tmp_path, f"levels: {{L1: {one}, L2: {one}}}"))
+    rides = [name for lane in found.lanes for name in lane.groups if lane.start == "l1-1"]
+    assert rides == [f"lift_cabin {name}" for name in "abcdefg"]
+
+
 def saved(folder: Path, texts: dict[str, str]) -> tuple[Path, Path]:
     for name, text in texts.items():
         (folder / name).write_text(text)
