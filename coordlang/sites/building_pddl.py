@@ -14,7 +14,7 @@ from pathlib import Path
 import networkx as nx
 
 from coordlang.sites.building import Building, Lane, Place, pddl_name
-from coordlang.sites.clearance import clash, excluded, staying
+from coordlang.sites.clearance import clash, excluded, motion
 from coordlang.sites.coordinates import checked
 from planners.system.errors import BadInput, Position, UsageError, note
 from planners.system.messages import counted, echoed, named, some, visible
@@ -346,4 +346,4 @@ def _require_apart(
 
 
 def _too_near(one: Place, other: Place, clearance: float) -> bool:
-    return one is other or clash(staying(one), staying(other), clearance)
+    return one is other or clash(motion(one, one), motion(other, other), clearance)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -32,22 +33,17 @@ class Motion:
     groups: frozenset[str]
 
 
-def staying(place: Place) -> Motion:
-    """Standing in a place for a step."""
-    return Motion(place.name, place.name, {place.level: (place.point, place.point)}, place.groups)
-
-
 def _driving(building: Building) -> list[Motion]:
     """Driving along lanes; each of them once, whatever the graphs that have it."""
-    groups: dict[tuple[str, str], frozenset[str]] = {}
+    groups = defaultdict[tuple[str, str], frozenset[str]](frozenset)
     for lane in building.lanes:
-        ends = lane.start, lane.end
-        groups[ends] = groups.get(ends, frozenset()) | lane.groups
-    return [_drive(building.places[a], building.places[b], own) for (a, b), own in groups.items()]
+        groups[lane.start, lane.end] |= lane.groups
+    return [motion(building.places[a], building.places[b], own) for (a, b), own in groups.items()]
 
 
-def _drive(start: Place, end: Place, groups: frozenset[str]) -> Motion:
-    on = {place.level: (place.point, place.point) for place in (start, end)}  # a ride in a lift
+def motion(start: Place, end: Place, groups: frozenset[str] = frozenset()) -> Motion:
+    """Driving along a lane, riding in a lift, or, from a place to itself, staying there."""
+    on = {place.level: (place.point, place.point) for place in (start, end)}
     if start.level == end.level:
         on = {start.level: (start.point, end.point)}
     return Motion(start.name, end.name, on, groups | start.groups | end.groups)
@@ -67,7 +63,7 @@ def excluded(building: Building, clearance: float) -> list[tuple[Motion, Motion]
     What the rules for every pair of robots forbid is left out: sharing a place, and swapping.
     """
     driving = _driving(building)
-    motions = [*driving, *map(staying, building.places.values())]
+    motions = [*driving, *(motion(place, place) for place in building.places.values())]
     near = np.triu(_near(motions, clearance), 1)[: len(driving)]
     pairs = [(motions[first], motions[second]) for first, second in np.argwhere(near).tolist()]
     return [pair for pair in pairs if not _is_ruled_out(*pair) and clash(*pair, clearance)]
