@@ -74,6 +74,13 @@ class Candidates:
         return self.source.tasks
 
     @property
+    def are_pairs_of_facts(self) -> bool:
+        """Whether they are all pairs of states, in which nothing but facts counts."""
+        model = self.model
+        has_more = model.remembers or model.slack or model.is_asynchronous
+        return self.kind == "all" and not has_more
+
+    @property
     def rows(self) -> Rows:
         """The table of states that every plan space's state numbers refer to."""
         return self.source.rows

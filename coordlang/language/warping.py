@@ -9,14 +9,12 @@ differ must separate ``u_i`` from ``v_j`` on some cell of *every* warping path.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 Pair = tuple[int, int]
 
 #: A clause: at least one of these pairs of states must lie in different words.
 Clause = frozenset[Pair]
-
-_NO_PATH = 10**9
 
 
 def pair(a: int, b: int) -> Pair:
@@ -24,33 +22,31 @@ def pair(a: int, b: int) -> Pair:
     return (a, b) if a < b else (b, a)
 
 
+def separates(words: Mapping[int, int], clause: Clause) -> bool:
+    """Whether states of some pair of a clause have different words."""
+    return any(words[a] != words[b] for a, b in clause)
+
+
 def warping_path(
     u: Sequence[int], v: Sequence[int], joined: Sequence[Sequence[bool]]
 ) -> list[tuple[int, int]] | None:
     """A warping path over ``joined[i][j]`` with the fewest non-identical cells, or None."""
-    best = [[_NO_PATH] * len(v) for _ in u]
-    for i, a in enumerate(u):
-        for j, b in enumerate(v):
-            if not joined[i][j]:
-                continue
-            before = min(_before(best, i, j)) if i or j else 0
-            if before < _NO_PATH:
-                best[i][j] = before + (a != b)
-    if best[-1][-1] >= _NO_PATH:
+    # Cells are counted from 1: each has one before it, and there is no path to those at the rim.
+    best = {(0, 0): 0}
+
+    def before(i: int, j: int) -> dict[tuple[int, int], int]:
+        cells = (i - 1, j - 1), (i - 1, j), (i, j - 1)
+        return {cell: best[cell] for cell in cells if cell in best}
+
+    for i, a in enumerate(u, 1):
+        for j, b in enumerate(v, 1):
+            if joined[i - 1][j - 1] and (found := before(i, j)):
+                best[i, j] = min(found.values()) + (a != b)
+    i, j = len(u), len(v)
+    if (i, j) not in best:
         return None
-    i, j = len(u) - 1, len(v) - 1
-    path = [(i, j)]
-    while i or j:
-        options = _before(best, i, j)
-        i, j = ((i - 1, j - 1), (i - 1, j), (i, j - 1))[options.index(min(options))]
-        path.append((i, j))
+    path = []
+    while i:
+        path.append((i - 1, j - 1))
+        i, j = min(before(i, j), key=best.__getitem__)
     return path[::-1]
-
-
-def _before(best: list[list[int]], i: int, j: int) -> tuple[int, int, int]:
-    """The values of the three cells before ``(i, j)``: diagonal, above, left."""
-    return (
-        best[i - 1][j - 1] if i and j else _NO_PATH,
-        best[i - 1][j] if i else _NO_PATH,
-        best[i][j - 1] if j else _NO_PATH,
-    )

@@ -79,11 +79,10 @@ class _Values:
         colour = self.away[first, np.arange(len(first))] % 2
         return np.append(colour, 0)[self.of_state]  # the last: no value
 
-    def of_other(self, other: _Values) -> Ints | None:
-        """(states) the value that has the other one's name; None if the two have none in common."""
+    def of_other(self, other: _Values) -> Ints:
+        """(states) the value that has the other one's name, -1 where there is none."""
         number_of = {name: number for number, name in enumerate(self.names)}
-        numbers = np.array([*(number_of.get(name, -1) for name in other.names), -1])
-        return numbers[other.of_state] if (numbers >= 0).any() else None
+        return np.array([*(number_of.get(name, -1) for name in other.names), -1])[other.of_state]
 
     def is_near(self, other: Ints) -> Bools:
         """(states) whether another value is this one or one beside it."""
@@ -102,10 +101,9 @@ def abstractions(candidates: Candidates, states: Sequence[int]) -> list[Ints]:
     """
     if not 0 < len(candidates.rows) <= _STATES:
         return []
-    variables = _variables(candidates)
     mine = np.array(states)
     found: dict[bytes, Ints] = {}
-    for columns in _chosen(variables):
+    for columns in _chosen(_variables(candidates)):
         classes = unique_rows(np.column_stack(columns).astype(np.int64) + 1)[1]
         if 1 < len(np.unique(classes[mine])) < len(mine):
             found.setdefault(_as_key(classes[mine]), classes)
@@ -140,21 +138,23 @@ def _variables(candidates: Candidates) -> list[_Values]:
 def _chosen(variables: Sequence[_Values]) -> Iterator[Sequence[Ints | Bools]]:
     """What is looked at in each abstraction: a list of columns (states)."""
     for told in variables:
-        others = [values for values in variables if values is not told]
-        base = [told.of_state, *(values.colours for values in others)]
-        yield [told.of_state]
-        yield base
-        # Of others that have values in common with the variable that is told.
-        seen = [at for values in others if (at := told.of_other(values)) is not None]
-        if seen:
-            near = [told.is_near(at) for at in seen]
-            yield [*base, *near]
-            yield [*base, *(np.where(close, at, -1) for close, at in zip(near, seen, strict=True))]
-    if len(variables) > 2:
-        for one, other in combinations(variables, 2):
-            rest = [v.colours for v in variables if v is not one and v is not other]
+        yield from _as_seen_from(told, [values for values in variables if values is not told])
+    for one, other in combinations(variables, 2):
+        rest = [v.colours for v in variables if v is not one and v is not other]
+        if rest:  # two variables alone are all that there is
             yield [one.of_state, other.of_state]
             yield [one.of_state, other.of_state, *rest]
+
+
+def _as_seen_from(told: _Values, others: Sequence[_Values]) -> Iterator[Sequence[Ints | Bools]]:
+    """The same where one variable is told."""
+    base = [told.of_state, *(values.colours for values in others)]
+    places = [told.of_other(values) for values in others]
+    near = [told.is_near(at) for at in places]
+    yield [told.of_state]
+    yield base
+    yield [*base, *near]
+    yield [*base, *(np.where(close, at, -1) for close, at in zip(near, places, strict=True))]
 
 
 def _as_key(classes: Ints) -> bytes:

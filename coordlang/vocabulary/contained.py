@@ -86,10 +86,7 @@ def parts(candidates: Candidates, group: SymmetryGroup, seed: int = 0) -> list[C
     Only for all pairs of states as tasks, few enough for one plan space, and for optimal plans: a
     symmetry of a part takes its steps to such steps, but need not keep the slack that is left.
     """
-    model = candidates.model
-    if candidates.kind != "all" or model.remembers or model.slack or model.is_asynchronous:
-        return []
-    if len(candidates.spaces) != 1:
+    if not candidates.are_pairs_of_facts or len(candidates.spaces) != 1:
         return []
     space = candidates.spaces[0]
     graph, named = _neighbours(candidates), _named(candidates)

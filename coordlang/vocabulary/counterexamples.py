@@ -12,10 +12,10 @@ of what was found only then.
 from __future__ import annotations
 
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import reduce
-from itertools import groupby, takewhile
+from itertools import takewhile
 from random import Random
 from typing import Any
 
@@ -78,8 +78,8 @@ class Mixtures:
         times as many are wanted from each node: it stands for so many images.  ``steps``: steps of
         robots that may be looked at.  Raises `Undecided` after so many steps.
         """
-        requires, space = self._choices.requires, self._space
-        if not requires[space.starts].any():
+        space = self._space
+        if not self._choices.requires[space.starts].any():
             return []
         if len(self._shared) + len(self._safe) + len(self._options) + len(self._spoken) > _KEPT:
             self._forget()
@@ -87,16 +87,7 @@ class Mixtures:
         #: How often the next steps of a mixture were looked at, and steps of robots that may be.
         self._visited, self._steps_left = 0, steps
         random = Random(0)  # always the same ones
-        found: dict[int, list[_Plans]] = {}
-        effort = sys.maxsize
-        nodes = np.flatnonzero(requires & space.descendants(space.starts)).tolist()
-        for node in sorted(nodes, key=lambda node: -self._failed[node]):
-            failing = self._of_node(node)
-            if failing is not None:
-                found[node] = [self._plans(node, failing, random)]
-                effort = min(effort, self._visited + _EFFORT * most)
-            if len(found) >= most or self._visited > effort:
-                break
+        found = self._first_of_nodes(most, random)
         effort = self._visited + _EFFORT * most
         for node, plans in found.items():
             if self._visited > effort:
@@ -104,9 +95,25 @@ class Mixtures:
             wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
             plans += sorted(self._others(node, wanted, random))
         self._failed.update(found.keys())
-        by_steps = groupby(sorted(found), key=lambda node: int(space.layer[node]))
-        plans_by_steps = ([own for node in nodes for own in found[node]] for _, nodes in by_steps)
-        return [np.array(plans, np.int64).transpose(0, 2, 1) for plans in plans_by_steps]
+        by_steps = defaultdict[int, list[_Plans]](list)
+        for node in sorted(found):
+            by_steps[int(space.layer[node])] += found[node]
+        return [np.array(own, np.int64).transpose(0, 2, 1) for own in by_steps.values()]
+
+    def _first_of_nodes(self, most: int, random: Random) -> dict[int, list[_Plans]]:
+        """By node, about ``most`` in all: plans of a mixture that fails from there."""
+        found: dict[int, list[_Plans]] = {}
+        effort, space = sys.maxsize, self._space
+        below = self._choices.requires & space.descendants(space.starts)
+        nodes = np.flatnonzero(below).tolist()
+        for node in sorted(nodes, key=lambda node: -self._failed[node]):
+            failing = self._of_node(node)
+            if failing is not None:
+                found[node] = [self._plans(node, failing, random)]
+                effort = min(effort, self._visited + _EFFORT * most)
+            if len(found) >= most or self._visited > effort:
+                break
+        return found
 
     def _of_node(self, node: int, random: Random | None = None) -> _Failing | None:
         """A mixture of plans from a node that fails while all of them have one sentence.
@@ -136,11 +143,9 @@ class Mixtures:
             if target is None:
                 common = self._common(following)
                 return codes, self._spoken.words.drawn(common, random or Random(0))
-            below, said = following, 0
-            if all(words for words, _ in following):
-                together = zip(*(words for words, _ in following), strict=False)
-                said = len(list(takewhile(lambda words: len(set(words)) == 1, together)))
-                below = tuple((words[said:], own) for words, own in following)
+            together = zip(*(words for words, _ in following), strict=False)
+            said = len(list(takewhile(lambda words: len(set(words)) == 1, together)))
+            below = tuple((words[said:], own) for words, own in following)
             found = self._failing(target, below, random)
             if found is not None:
                 steps, sentence = found

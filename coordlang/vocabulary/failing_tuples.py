@@ -291,5 +291,4 @@ def _fewest_cells(u: Ints, v: Ints, first: Ints, second: Ints) -> NDArray[np.int
             here += differ[i, j]
             here[apart[i, j]] = _NO_PATH
             best[i + 1, j + 1] = np.minimum(here, _NO_PATH)
-            best[0, 0] = _NO_PATH
     return best

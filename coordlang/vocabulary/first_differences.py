@@ -112,11 +112,7 @@ def differences(
                 found, rows = [_merged(found)], 0
             progress(f"looking where coordination is required: {so_far()}")
     merged = _merged(found)
-    if goals is not None:  # the figures are those of all already
-        merged["states"] = goals.images_of_states(merged["states"])
-        if "divergences" in merged:
-            merged["divergences"] = minimal(goals.images_of_rows(merged["divergences"]))
-    return _read(merged)
+    return _read(merged if goals is None else merged | _images(merged, goals))
 
 
 def _of_goals(shared: tuple[Source, Ints | None, float], goals: range) -> Table:
@@ -156,6 +152,14 @@ def _read(table: Table) -> FirstDifferences:
     """What the jobs found; sets and mixtures are counted anew in each."""
     figures = table["figures"].tolist()
     return FirstDifferences(table.get("divergences"), table["states"], *figures)
+
+
+def _images(merged: Table, goals: SymmetricGoals) -> Table:
+    """States and divergences of all goals, from those chosen; figures are of all already."""
+    images = {"states": goals.images_of_states(merged["states"])}
+    if "divergences" in merged:
+        images["divergences"] = minimal(goals.images_of_rows(merged["divergences"]))
+    return images
 
 
 def _merged(found: Sequence[Table]) -> Table:
@@ -228,9 +232,7 @@ def symmetric_goals(
     """
     model = candidates.model
     states = len(candidates.rows)
-    if candidates.kind != "all" or model.remembers or model.slack or model.is_asynchronous:
-        return None
-    if states**2 * len(model.robots) < least:
+    if not candidates.are_pairs_of_facts or states**2 * len(model.robots) < least:
         return None
     if states**2 < for_action * (len(model.actions) + len(model.codec.facts)):
         return None

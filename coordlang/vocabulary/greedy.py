@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
-from coordlang.language.warping import Clause, pair
+from coordlang.language.warping import Clause, Pair, pair
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from planners.joint.tables import Ints
 
@@ -63,8 +63,8 @@ def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -
 
     O(words * (states + constraints)).
     """
-    clashes: dict[int, set[int]] = {state: set() for state in states}
-    for a, b in {states for own in constraints if len(own) == 1 for states in own[0]}:
+    clashes = defaultdict[int, set[int]](set)
+    for a, b in clashing(constraints):
         clashes[a].add(b)
         clashes[b].add(a)
     several = _Alternatives([own for own in constraints if len(own) > 1])
@@ -85,6 +85,11 @@ def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -
         waiting = left
         number += 1
     return words
+
+
+def clashing(constraints: Iterable[Constraint]) -> set[Pair]:
+    """The pairs of states that constraints without a choice separate."""
+    return {states for own in constraints if len(own) == 1 for states in own[0]}
 
 
 class _Alternatives:

@@ -44,12 +44,9 @@ def merged(
     closed, left = forbidden_merges(pool, word, {}), False
     merges, steps = 1, _STEPS
     while True:
-        trial, of_trial, pair = word, closed, None
-        for _ in range(merges):
-            if (pair := _next_merge(trial[mine], of_trial)) is None:
-                break
-            trial, of_trial = _merge(trial, of_trial, pair)
-        if trial is word:
+        pair = _next_merge(word[mine], closed)
+        trial, of_trial = _merged_often(word, closed, mine, merges)
+        if pair is None:
             if not left:
                 return
             closed, left, steps = forbidden_merges(pool, word, {}), False, 2 * steps
@@ -59,7 +56,7 @@ def merged(
             holds = not languages.agreeing(trial, None, 1, steps)
         except Undecided:
             holds = False
-            if merges == 1 and pair is not None:
+            if merges == 1:
                 closed[pair] = closed[pair[::-1]] = left = True
         if holds:
             word, merges = trial, 2 * merges
@@ -103,6 +100,15 @@ def _forbid(forbidden: Bools, said: Ints) -> None:
         words = said[:, :, rows]
         agree = sequences_agree(np.where(words == gone, into, words))
         forbidden[into[agree], gone[agree]] = forbidden[gone[agree], into[agree]] = True
+
+
+def _merged_often(word: Ints, forbidden: Bools, mine: Ints, merges: int) -> tuple[Ints, Bools]:
+    """The words, and what is forbidden, after so many merges, or as many as there are."""
+    for _ in range(merges):
+        if (pair := _next_merge(word[mine], forbidden)) is None:
+            break
+        word, forbidden = _merge(word, forbidden, pair)
+    return word, forbidden
 
 
 def _next_merge(word: Ints, forbidden: Bools) -> tuple[int, int] | None:

@@ -130,7 +130,8 @@ class MinimalSearch:
         self._pairs = sum(int((degree**2).sum()) for degree in degrees)
         self._is_dear = self._pairs > _DEAR
         self._merges = 0
-        self._merging: tuple[Assignment, Iterator[Assignment]] | None = None
+        #: A language, and those that are made of it by merging words.
+        self._merging: tuple[Assignment | None, Iterator[Assignment]] = None, iter(())
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
         self.refuting: Mapping[Clause, Evidence] = {}
@@ -189,8 +190,7 @@ class MinimalSearch:
             return
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
-        if self._one_task is not None:
-            self._begin_with(self._one_task)
+        self._begin_with_one_task()
         while self._is_open and self.decide(self.lower, _SOON):
             pass
         while self._is_open and not self._is_one_task:
@@ -203,24 +203,30 @@ class MinimalSearch:
             # Merged words tell more states apart than a language must: fewer leave more plans open.
             self.decide(self.lower, Budget())
 
-    def _begin_with(self, one_task: OneTask) -> None:
-        """Decide what is soon decided from below, and look for words of a kind."""
-        if not self._is_open:
+    def _begin_with_one_task(self) -> None:
+        """Of one task: decide what is soon decided from below, and look for words of a kind."""
+        one_task = self._one_task
+        if one_task is None or not self._is_open:
             return
-        (space,) = self._job.candidates.spaces
         of_kinds = iter(_WHERE_DEAR if self._is_dear else _FOR_KINDS)
-        from_below = self.lower > 2 or self._find_or_refute(2, _SOON)
+        from_below = self._find_or_refute(2, _SOON)
         if from_below and one_task.is_large:
             self._find_fewer_tied(next(of_kinds))
         while from_below and self._is_open and one_task.can_decide(self.lower):
             from_below = self._find_or_refute(self.lower, _SOON)
-        if len(space.target) * between(self.lower, self.upper) > _CLAUSES:
-            found = self._tied.of_facts()
-            if found is not None and word_count(found) < self.upper:
-                self._offer(found)
-                self.merge(most=_MERGED_SOON)
+        self._merge_words_of_facts()
         for rounds in of_kinds:
             self._find_fewer_tied(rounds)
+
+    def _merge_words_of_facts(self) -> None:
+        """Begin with words that a few facts say where a solver would get too many clauses."""
+        (space,) = self._job.candidates.spaces
+        if len(space.target) * between(self.lower, self.upper) <= _CLAUSES:
+            return
+        found = self._tied.of_facts()
+        if found is not None and word_count(found) < self.upper:
+            self._offer(found)
+            self.merge(most=_MERGED_SOON)
 
     def _find_fewer_tied(self, rounds: int) -> None:
         """Look for a language of some kind with fewer words than the best one.
@@ -276,10 +282,10 @@ class MinimalSearch:
         """
         if self.best is None or self.upper <= self.lower:
             return
-        if self._merging is None or self._merging[0] is not self.best:
+        if self._merging[0] is not self.best:
             self._merging = self.best, merged(self.best, self._job.states, self.languages)
         coarsest, failed = self.best, 0
-        for number, coarser in enumerate(self._merging[1], 1):
+        for coarser in islice(self._merging[1], most):
             failed += 1
             if word_count(coarser) < word_count(coarsest):
                 coarsest, failed = coarser, 0
@@ -287,7 +293,7 @@ class MinimalSearch:
                     self._offer(coarsest)  # what is not verified is lost when time is over
             self._merges += 1
             self._report(f"merging words: {word_count(coarser)} left")
-            if self._is_spent or failed >= vain or number >= most:
+            if self._is_spent or failed >= vain:
                 break
         if coarsest is not self.best:
             self._offer(coarsest)

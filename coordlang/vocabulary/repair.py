@@ -10,13 +10,13 @@ words is then looked for, as `minimal` does.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable
 from contextlib import closing
 from dataclasses import dataclass
-from itertools import count
+from itertools import chain, count
 
-from coordlang.language.warping import Clause
+from coordlang.language.warping import Clause, separates
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.loop import Budget, ProblemsBySize, close_bounds, find
@@ -141,8 +141,9 @@ class _Repair:
         """The states of every clause, from number ``first`` on, that the old words violate."""
         kept = self._kept
         for clause in self._languages.clauses[first:]:
-            if all(a in kept and b in kept and kept[a] == kept[b] for a, b in clause):
-                yield frozenset(state for states in clause for state in states)
+            states = frozenset(chain(*clause))
+            if states <= kept.keys() and not separates(kept, clause):
+                yield states
 
     def _apart(self, changed: set[int]) -> dict[int, int]:
         """The old words, changed and new states each in a word of its own."""
@@ -169,20 +170,18 @@ class _Repair:
     def _first_fit(self, changed: set[int]) -> dict[int, int]:
         partition = self._apart(changed)
         clauses = without_implied(self._languages.clauses, _COMPARISONS)
-        of_state: dict[int, list[Clause]] = {}
+        of_state = defaultdict[int, list[Clause]](list)
         for clause in clauses:
-            for state in {state for states in clause for state in states}:
-                of_state.setdefault(state, []).append(clause)
+            for state in set(chain(*clause)):
+                of_state[state].append(clause)
         used = self._old_words
         own = [s for s in self._job.states if partition[s] >= self._old_words]
         # Until a state is placed its word is a number that no placed state has.
         partition |= {state: -1 - state for state in own}
         for state in most_constrained_first(own, clauses):
-            first = self._kept.get(state, self._default)
-            for word in (first, *range(used + 1)):
+            for word in (self._kept.get(state, self._default), *range(used + 1)):
                 partition[state] = word
-                mine = of_state.get(state, ())
-                if all(any(partition[a] != partition[b] for a, b in c) for c in mine):
+                if all(separates(partition, clause) for clause in of_state[state]):
                     break
             used = max(used, partition[state] + 1)
         return partition

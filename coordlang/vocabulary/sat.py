@@ -218,14 +218,10 @@ class PartitionProblem:
         words are used, where words are not named.
         """
         if size < self.size and not self._used:
-            self._used = [self._new() for _ in range(self.size)]
-            self._solver.set_phases(self._used)  # a word that is free may be used
-            for own in self._word.values():
-                for variable, used in zip(own, self._used, strict=True):
-                    self._solver.add_clause((-variable, used))
+            self._count_used()
         if not satisfiable(self._solver, [-word for word in self._used[size:]], conflicts):
             return None
-        true = {v for v in self._solver.get_model() if v > 0}
+        true = set(self._solver.get_model())
         return {s: next(w for w, v in enumerate(own) if v in true) for s, own in self._word.items()}
 
     @property
@@ -253,6 +249,14 @@ class PartitionProblem:
             for a, b in zip(*(self._word[s] for s in states), strict=True):
                 self._solver.add_clause([-variable, -a, -b])
         return self._separated[states]
+
+    def _count_used(self) -> None:
+        """Say of each word whether it is used, so that the others can be assumed not to be."""
+        self._used = [self._new() for _ in range(self.size)]
+        self._solver.set_phases(self._used)  # a word that is free may be used
+        for own in self._word.values():
+            for variable, used in zip(own, self._used, strict=True):
+                self._solver.add_clause((-variable, used))
 
     def _is_separated(self, states: Pair) -> int:
         """The variable of `_separate`, made false where both states have one word."""

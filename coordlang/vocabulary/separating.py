@@ -16,7 +16,13 @@ import numpy as np
 from coordlang.language.warping import Clause, Pair, pair
 from coordlang.required.composition_walk import Difference, DifferenceWalk
 from coordlang.symmetry.group import symmetry_group
-from coordlang.vocabulary.greedy import Constraint, alternatives, greedy_partition, separations
+from coordlang.vocabulary.greedy import (
+    Constraint,
+    alternatives,
+    clashing,
+    greedy_partition,
+    separations,
+)
 from coordlang.vocabulary.job import Assignment, Job, Outcome, word_count
 from coordlang.vocabulary.loop import Budget, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, clique, most_constrained_first
@@ -88,7 +94,7 @@ class _Search:
         """
         states, known = self._job.states, self._known
         known += separations(self._job.first_differences.listed)
-        edges = {p for c in known if len(c) == 1 for p in c[0]}
+        edges = clashing(known)
         self._apart = clique(edges)
         self.lower = max(self.lower, len(self._apart))
         if all(len(constraint) == 1 for constraint in known):
