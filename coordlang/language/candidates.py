@@ -120,8 +120,7 @@ def all_pairs(
     with no action to remember.
     """
     loaded = build(domain, problems, options)
-    model = loaded.model
-    inits = np.stack([task.init for task in loaded.tasks])
+    model, inits = loaded.model, _inits(loaded.tasks)
     if not model.remembers:
         space = explore(model, inits)
         return Candidates("all", loaded, Explored(space, _to_each_state(space)), len(space))
@@ -166,24 +165,14 @@ def from_listed(
             "the list of tasks is empty", position=position, remedy="Give at least one task."
         )
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
-    model = loaded.model
-    starts = np.stack([task.init for task in loaded.tasks])
-    inits = np.stack([task.init for task in tasks])
+    model, starts, inits = loaded.model, _inits(loaded.tasks), _inits(tasks)
     space = explored_if_small(model, starts)
     if space is None:
-        unreachable = _surely_unreachable(model, starts, inits)
-    else:
-        reached, _ = unique_rows(model.codec.facts_part(space.rows))
-        unreachable = find_rows(reached, model.codec.facts_part(inits)) < 0
-    for number in np.flatnonzero(unreachable)[:1].tolist():
-        raise BadInput(
-            f"task {number + 1}: the state {model.state_text(inits[number])} cannot be "
-            f"reached from the initial state of {problems[0].source.name}",
-            position=position,
-            remedy="Is a fluent missing or one too many?  List all fluents that are true.",
-        )
-    if space is None:
+        _refuse_first(_surely_unreachable(model, starts, inits), loaded, inits, position)
         return _listed_one_by_one(loaded, listed, tasks, position, skip_unsolvable)
+    reached, _ = unique_rows(model.codec.facts_part(space.rows))
+    unreachable = find_rows(reached, model.codec.facts_part(inits)) < 0
+    _refuse_first(unreachable, loaded, inits, position)
     if model.remembers:  # a task starts with no action to remember: those are states of their own
         space = explore(model, inits)
     source, lost = _by_goal(space, tasks)
@@ -193,6 +182,23 @@ def from_listed(
     skipped = {number: _named(number, listed[number]) for number in lost}
     served = tuple(task for number, task in enumerate(listed) if number not in skipped)
     return Candidates("file", loaded, source, len(reached), served, tuple(skipped.values()))
+
+
+def _inits(tasks: Sequence[PlanningTask]) -> Rows:
+    return np.stack([task.init for task in tasks])
+
+
+def _refuse_first(
+    unreachable: Bools, loaded: PlanningInstance, inits: Rows, position: Position | None
+) -> None:
+    """Raise `BadInput` for the first initial state of a task that the problem does not reach."""
+    for number in np.flatnonzero(unreachable)[:1].tolist():
+        raise BadInput(
+            f"task {number + 1}: the state {loaded.model.state_text(inits[number])} cannot be "
+            f"reached from the initial state of {loaded.problems[0].source.name}",
+            position=position,
+            remedy="Is a fluent missing or one too many?  List all fluents that are true.",
+        )
 
 
 def _by_goal(space: Space, tasks: Sequence[PlanningTask]) -> tuple[Explored, list[int]]:

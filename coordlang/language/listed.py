@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
@@ -218,24 +218,21 @@ def varied_tasks(
     task = loaded.tasks[0]
     space = explore(model, task.init[None, :])
     facts, names = model.codec.truth(space.rows), model.codec.facts.texts
-    free = np.zeros(len(names), np.bool_)
-    for pattern in starts:
-        free[_matching(names, pattern)] = True
+    free = [fact for pattern in starts for fact in _matching(names, pattern)]
     own = facts[space.numbers(task.init[None, :])[0]]
-    here = np.flatnonzero((facts == own)[:, ~free].all(axis=1))
+    here = np.flatnonzero(np.delete(facts == own, free, axis=1).all(axis=1))
+    texts, reached = [goal_atoms(task.goal)], [model.holds(task.goal, space.rows)]
     if goals:
         wanted = _goals(facts, [_matching(names, pattern) for pattern in goals])
-        texts = [tuple(names[fact] for fact in goal) for goal in wanted]
-        reached = [facts[:, list(goal)].all(axis=1) for goal in wanted]
-    else:
-        texts, reached = [goal_atoms(task.goal)], [model.holds(task.goal, space.rows)]
+        texts = [_named(names, goal) for goal in wanted]
+        reached = [np.all(facts[:, list(goal)], axis=1) for goal in wanted]
     found: list[ListedTask] = []
     size = max(1, _BATCH // len(space))
     for first in range(0, len(reached), size):
         far = distances(space, np.stack(reached[first : first + size]))[:, here]
-        for goal, start in zip(*(part.tolist() for part in np.nonzero(far > 0)), strict=True):
-            key = tuple(names[fact] for fact in np.flatnonzero(facts[here[start]]))
-            found.append(ListedTask(key, texts[goal + first]))
+        for goal, start in np.argwhere(far > 0).tolist():
+            init = _named(names, np.flatnonzero(facts[here[start]]))
+            found.append(ListedTask(init, texts[goal + first]))
     if not found:
         raise ProvedImpossible(
             f"there is no such task: none of {len(here):,} starts reaches one of {len(texts):,} "
@@ -243,6 +240,10 @@ def varied_tasks(
             remedy="Give patterns that match more atoms: ? stands for any one name.",
         )
     return tuple(sorted(found, key=lambda task: (task.init, task.goal)))
+
+
+def _named(names: Sequence[str], facts: Iterable[int]) -> tuple[str, ...]:
+    return tuple(names[fact] for fact in facts)
 
 
 def _goals(facts: Bools, matching: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:

@@ -159,6 +159,11 @@ class Provenance:
     lifted: Mapping[str, Any] = field(default_factory=dict)
     tolerance: Tolerance | None = None
 
+    @property
+    def slack(self) -> int | None:
+        """The joint steps by which plans may be longer than the least makespan, if any."""
+        return self.tolerance.slack if self.tolerance else None
+
 
 def provenance_of(
     candidates: Candidates, guarantee: Guarantee, producer: Mapping[str, Any]

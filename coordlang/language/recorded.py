@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
@@ -36,18 +36,19 @@ def options_of(
     ``given`` names the fields of ``model`` that the user gave.  Raises `UsageError` for one that
     contradicts the file.
     """
-    entries: Mapping[str, Any] = language.provenance.model
+    provenance, model = language.provenance, model or ModelOptions()
+    entries = provenance.model
     recorded = ModelOptions(
-        language.provenance.robots or (model.names if model else ()),
+        provenance.robots or model.names,
         unowned=entries.get("unowned", "error"),
         cost=entries.get("cost", "makespan"),
         remember_actions=entries.get("remember_actions", False),
-        slack=(language.tolerance.slack if language.tolerance else None) or 0,
+        slack=provenance.slack or 0,
         words_see_slack=entries.get("words_see_slack", False),
         asynchronous=entries.get("execution") == "asynchronous",
-        recorded=bool(language.provenance.robots),
+        recorded=bool(provenance.robots),
     )
-    for name in sorted(given) if model else ():
+    for name in sorted(given):
         mine, own = getattr(model, name), getattr(recorded, name)
         if name == "robots" and recorded.unowned == "environment":  # it may be the extra one
             mine, own = (tuple(r for r in names if r != ENVIRONMENT) for names in (mine, own))

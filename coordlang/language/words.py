@@ -57,10 +57,8 @@ class Partition:
         Words are called ``w0, w1, ..`` in the order of their first state; the default is the word
         with most states.
         """
-        order: dict[int, int] = {}
         states = sorted(words)
-        for state in states:
-            order.setdefault(words[state], len(order))
+        order = {word: n for n, word in enumerate(dict.fromkeys(words[s] for s in states))}
         word = np.array([order[words[state]] for state in states], np.int64)
         names = tuple(f"w{n}" for n in range(max(1, len(order))))
         most = int(np.bincount(word, minlength=1).argmax())
@@ -122,7 +120,7 @@ class Language(Presented):
         known = self.provenance.tolerance
         if self.guarantee.coordination_language or (known is not None and known.may_fail):
             return known
-        return UnknownFailures(slack=known.slack if known else None)
+        return UnknownFailures(slack=self.provenance.slack)
 
     @property
     def may_fail(self) -> bool:

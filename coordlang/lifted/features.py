@@ -423,7 +423,7 @@ def feature_of(text: str, position: Position) -> Feature:
     """The feature that a text defines.  Raises `BadInput` for anything else."""
     try:
         found: Feature | None = _read("Feature", _tree(parse(Source("feature", text))))
-    except (ValueError, BadInput):
+    except (LookupError, ValueError, BadInput):
         found = None
     if found is None or str(found) != " ".join(text.split()):
         raise BadInput(
@@ -440,38 +440,38 @@ def _tree(part: Token | Group) -> Tree:
 
 
 def _read(kind: str, tree: Tree) -> Any:
-    """What a text is as something of a kind, the type of a field.  Raises `ValueError` if none."""
+    """What a text is as something of a kind, the type of a field.  Raises an error if none."""
     match kind, tree:
         case "str", str():
             return tree
         case "int", str() if 0 < int(tree) < LARGEST:
             return int(tree)
-        case "Feature", ["mod", _, "1"]:
-            raise ValueError
-        case "Feature", ["sign", ["-", one, other]]:
-            return Sign(_read("Number", one), _read("Number", other))
-        case (("Term" | "Role"), _):
-            return _term(tree) if kind == "Term" else _role(tree)
+        case "Term", _:
+            return _term(tree)
+        case "Role", _:
+            return _role(tree)
         case "Concept", str():
             return Everything() if tree == "all" else Named(tree)
         case _, [str(head), *parts]:
-            made = _MADE.get((kind, head))
-            if made is None:
-                return _number(kind, head, parts)
-            kinds = [str(field.type) for field in fields(made)]  # type: ignore[arg-type]
-            return made(*(_read(own, part) for own, part in zip(kinds, parts, strict=True)))
+            return _of_parts(kind, head, parts)
     raise ValueError
 
 
-def _number(kind: str, head: str, parts: list[Tree]) -> Attribute | Count:
+def _of_parts(kind: str, head: str, parts: list[Tree]) -> Expression:
     match kind, head, parts:
+        case "Feature", "mod", [_, "1"]:
+            raise ValueError
+        case "Feature", "sign", [["-", one, other]]:
+            return Sign(_read("Number", one), _read("Number", other))
         case "Number", "count", [predicate, *args]:
             return Count(_read("str", predicate), tuple(_read("str", arg) for arg in args))
         case "Number", ("row" | "column"), [term]:
             return Attribute(head, "", _term(term))
         case "Number", ("degree" | "position"), [str(relation), term]:
             return Attribute(head, relation, _term(term))
-    raise ValueError
+    made = _MADE[kind, head]
+    kinds = [str(field.type) for field in fields(made)]  # type: ignore[arg-type]
+    return made(*(_read(own, part) for own, part in zip(kinds, parts, strict=True)))
 
 
 def _term(tree: Tree) -> Term:

@@ -22,6 +22,7 @@ from planners.joint.tables import Bools, Ints, Rows
 from planners.loading import PlanningInstance
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.robots import static_atoms
+from planners.search.graphs import csgraph
 
 #: No object, or a number that is not defined.
 NONE = -1
@@ -150,22 +151,18 @@ class States(Asked):
 
 
 def _atoms(states: States, predicate: str, arity: int) -> tuple[Ints, ...]:
-    world = states.world
-    static = [args for args in world.statics.get(predicate, ()) if len(args) == arity]
-    if static:
-        state = np.repeat(np.arange(len(states)), len(static))
-        own = np.array([[world.number[name] for name in args] for args in static])
-        own = np.tile(own, (len(states), 1))
+    world, atoms = states.world, states.world.model.codec.facts.atoms
+    found = [args for args in world.statics.get(predicate, ()) if len(args) == arity]
+    if found:
+        state = np.repeat(np.arange(len(states)), len(found))
+        which = np.tile(np.arange(len(found)), len(states))
     else:
-        args = np.full((len(world.model.codec.facts), arity), NONE)
-        mine = np.zeros(len(args), bool)
-        for fact, atom in enumerate(world.model.codec.facts.atoms):
-            if atom.predicate == predicate and len(atom.args) == arity:
-                mine[fact] = True
-                args[fact] = [world.number[name] for name in atom.args]
-        chosen: Bools = mine[states.true.fact]
-        state, own = states.true.row[chosen], args[states.true.fact[chosen]]
-    return state, *(own[:, place] for place in range(arity))
+        mine = [n for n, a in enumerate(atoms) if (a.predicate, len(a.args)) == (predicate, arity)]
+        found, true = [atoms[fact].args for fact in mine], states.true
+        chosen = np.isin(true.fact, mine)
+        state, which = true.row[chosen], np.searchsorted(mine, true.fact[chosen])
+    numbers = np.array([[world.number[name] for name in args] for args in found], np.int64)
+    return state, *numbers.reshape(len(found), arity)[which].T
 
 
 def named_objects(worlds: Sequence[World], landmarks: bool = False) -> tuple[str, ...]:
@@ -230,9 +227,8 @@ def positions(pairs: Sequence[Pair]) -> Mapping[str, int]:
     import networkx as nx
 
     graph = nx.DiGraph(pairs)
-    if any(most > 1 for _, most in (*graph.in_degree(), *graph.out_degree())):
-        return {}
-    if not nx.is_directed_acyclic_graph(graph):
+    branches = any(most > 1 for _, most in (*graph.in_degree(), *graph.out_degree()))
+    if branches or not nx.is_directed_acyclic_graph(graph):
         return {}
     along = enumerate(nx.topological_generations(graph))
     return {place: steps for steps, places in along for place in places}
@@ -257,10 +253,9 @@ def distances(world: World, relation: str) -> Ints:
 
     What it links with nothing has no distance to itself either.
     """
+    sparse, joined = csgraph(), _joined(world, relation)
     from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import shortest_path
 
-    joined = _joined(world, relation)
-    steps = shortest_path(csr_matrix(joined), unweighted=True)
+    steps = sparse.shortest_path(csr_matrix(joined), unweighted=True)
     steps[~joined.any(axis=1)] = np.inf
     return np.where(np.isfinite(steps), steps, NONE).astype(np.int64)

@@ -137,12 +137,10 @@ def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:
             "separation",
             remedy=_REBUILD,
         )
-    clause: set[Pair] = set()
-    for path in reason.paths:
-        clause |= _different_cells(path, states)
+    cells = [_different_cells(path, states) for path in reason.paths]
     if not _joins_all([path.plans for path in reason.paths], robots):
         raise Refuted("its warping paths do not join all of its plans", remedy=_REBUILD)
-    return frozenset(clause)
+    return frozenset(chain(*cells))
 
 
 def _different_cells(path: WarpingPath, states: Sequence[Sequence[int]]) -> set[Pair]:

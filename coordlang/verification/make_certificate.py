@@ -20,7 +20,7 @@ from coordlang.verification.certificate_file import (
     WarpingPath,
     states_of,
 )
-from coordlang.vocabulary.job import Evidence
+from coordlang.vocabulary.job import Evidence, words_of_states
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable, without_implied
 from planners.joint.states import split_atoms
 from planners.search.sat import sat_solver
@@ -87,7 +87,7 @@ def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
     found = without_implied(clauses)
     with suppress(Undecided):
         found = _in_the_way(found, size)
-        return _used(found, size)
+        found = _used(found, size)
     return found
 
 
@@ -96,11 +96,10 @@ def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
     states = states_of(clauses)
     pairs = np.array([p for clause in clauses for p in sorted(clause)], np.int64).reshape(-1, 2)
     bounds = np.cumsum([0, *(len(clause) for clause in clauses)])[:-1]
-    words = np.zeros(max(states, default=0) + 1, np.int64)
     kept: list[Clause] = []
     with closing(PartitionProblem(states, size)) as problem:
         while (partition := problem.solve(_EASY)) is not None:
-            words[list(partition)] = list(partition.values())
+            words = words_of_states(partition, 1 + max(states, default=0))
             apart = words[pairs[:, 0]] != words[pairs[:, 1]]
             held = np.logical_or.reduceat(apart, bounds) if len(clauses) else apart
             broken = np.flatnonzero(~held)

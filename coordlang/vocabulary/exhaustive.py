@@ -19,16 +19,13 @@ def exhaustive(job: Job) -> Outcome:
 
     Exponential in everything; the other methods are checked against it.
     """
-    failing = sorted(set(_failing(job)))
-    tried = 0
+    failing, tried = sorted(set(_failing(job))), 0
     for size in range(1, len(job.states) + 1):
         for words in partitions(len(job.states), size):
             tried += 1
             word = dict(zip(job.states, words, strict=True))
-            if not any(
-                len({sentence(word[s] for s in states) for states in plans}) == 1
-                for plans in failing
-            ):
+            sentences = ({sentence(word[s] for s in states) for states in own} for own in failing)
+            if all(len(said) > 1 for said in sentences):
                 return Outcome(word, size, {"partitions": tried, "failing_mixtures": len(failing)})
     raise AssertionError("states all apart are a language where no plans are inseparable")
 
@@ -38,12 +35,10 @@ def _failing(job: Job) -> Iterator[_Failing]:
         counted = counts(space)
         for start in space.starts.tolist():
             plans = Plans(space, start, counted)
-            listed = list(plans)
-            optimal = set(listed)
-            states = [tuple(plans.states(plan)) for plan in listed]
-            for chosen in product(range(len(listed)), repeat=space.robots):
-                if _mixture([listed[k] for k in chosen]) not in optimal:
-                    yield tuple(states[k] for k in chosen)
+            states = {plan: tuple(plans.states(plan)) for plan in plans}
+            for chosen in product(states, repeat=space.robots):
+                if _mixture(chosen) not in states:
+                    yield tuple(states[plan] for plan in chosen)
 
 
 def _mixture(plans: Sequence[Plan]) -> Plan:

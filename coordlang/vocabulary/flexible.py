@@ -61,8 +61,8 @@ class _Search(LocalSearch):
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
         """The best language, with what is known of it."""
-        improved = {"moves": self.moves, "improvements": self._improvements}
-        figures = {**self._found.figures, **improved}
+        figures: dict[str, float] = {**self._found.figures, "moves": self.moves}
+        figures["improvements"] = self._improvements
         with suppress(OutOfMemory):
             figures |= self._measures()
         return replace(self._found, partition=self.partition, figures=figures, stopped=stopped)

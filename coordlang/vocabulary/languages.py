@@ -107,16 +107,11 @@ class Languages:
         self.rounds += 1
         violated = self.violated(words_of_states(partition, self.pool.states))
         for clause in without_implied(violated):
-            evidence = violated[clause]
-            self._add(clause, evidence)
-            for image, symmetry in self.group.images(clause):
-                self._add(image, replace(evidence, symmetry=symmetry))
+            for image, symmetry in ((clause, None), *self.group.images(clause)):
+                if image not in self.evidence:
+                    self.evidence[image] = replace(violated[clause], symmetry=symmetry)
+                    self.clauses.append(image)
         return not violated
-
-    def _add(self, clause: Clause, evidence: Evidence) -> None:
-        if clause not in self.evidence:
-            self.evidence[clause] = evidence
-            self.clauses.append(clause)
 
     def agreeing(
         self,

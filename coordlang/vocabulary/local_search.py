@@ -85,7 +85,9 @@ class LocalSearch(ABC):
         self._unit, self._price, in_vain = 0.0, _PRICE, 0
         moves = max(_LEAST_MOVES, _MOVES * len(self._movable) * self._words)
         while in_vain < _PATIENCE and self._work < self._most and self._movable:
-            self._begin(word)
+            self._word, self._values = word, self._valued(word, np.arange(len(self.table)))
+            self._energy = self._norm(self._values)
+            self._violated = self._learn_clauses()
             before = self.best
             self._cool(moves)
             if self.settle():
@@ -93,11 +95,6 @@ class LocalSearch(ABC):
             word, in_vain = self.best_word, in_vain + 1
             if self.best < before - _EQUAL:
                 moves, in_vain = moves + moves // 2, 0
-
-    def _begin(self, word: Ints) -> None:
-        self._word, self._values = word, self._valued(word, np.arange(len(self.table)))
-        self._energy = self._norm(self._values)
-        self._violated = self._learn_clauses()
 
     def _cool(self, moves: int) -> None:
         for number in range(moves):

@@ -100,15 +100,6 @@ def close_bounds(
             budget = budget.doubled()
 
 
-@dataclass(slots=True)
-class _Kept:
-    """A problem, with the numbers of requirements that it started with and that it has."""
-
-    problem: PartitionProblem
-    at_start: int
-    known: int
-
-
 class ProblemsBySize(Generic[Requirement]):
     """The partition problem of each number of words, kept as long as it is undecided.
 
@@ -126,7 +117,8 @@ class ProblemsBySize(Generic[Requirement]):
         require: Callable[[PartitionProblem, Requirement], None],
     ) -> None:
         self._known, self._start, self._require = known, start, require
-        self._kept: dict[int, _Kept] = {}
+        #: Of each size a problem, and how many requirements it started with, and has.
+        self._kept: dict[int, tuple[PartitionProblem, int, int]] = {}
         self.conflicts = 0
 
     def find(self, size: int, conflicts: int) -> dict[int, int] | None:
@@ -135,22 +127,24 @@ class ProblemsBySize(Generic[Requirement]):
         Raises `Undecided` after so many ``conflicts`` of the solver.  When the requirements have
         grown much, the problem starts afresh: the order of its states was that of few.
         """
-        kept, number = self._kept.get(size), len(self._known)
-        if kept is None or number > _GROWTH * kept.at_start:
+        problem, at_start, known = self._kept.get(size, (None, 0, 0))
+        if problem is None or len(self._known) > _GROWTH * at_start:
             self.drop(size)
-            kept = self._kept[size] = _Kept(self._start(size), number, number)
-        for requirement in self._known[kept.known :]:
-            self._require(kept.problem, requirement)
-        kept.known, before = number, kept.problem.conflicts
+            problem, at_start, known = self._start(size), len(self._known), len(self._known)
+        self._kept[size] = problem, at_start, len(self._known)
+        for requirement in self._known[known:]:
+            self._require(problem, requirement)
+        before = problem.conflicts
         try:
-            return kept.problem.solve(conflicts)
+            return problem.solve(conflicts)
         finally:
-            self.conflicts += kept.problem.conflicts - before
+            self.conflicts += problem.conflicts - before
 
     def drop(self, size: int) -> None:
         """Forget a number that is decided."""
-        if (kept := self._kept.pop(size, None)) is not None:
-            kept.problem.close()
+        problem, *_ = self._kept.pop(size, (None,))
+        if problem is not None:
+            problem.close()
 
     def close(self) -> None:
         """Give back what the solvers hold."""

@@ -122,11 +122,9 @@ class MinimalSearch:
         """Begin; the search ends after ``effort``, in thousands of ``work``, None: by its proof."""
         self._job = job
         self._most = sys.maxsize if effort is None else effort * _UNIT
-        candidates = job.candidates
-        self._is_one_task = candidates.count == 1
-        self._is_asynchronous = candidates.model.is_asynchronous
+        self._is_one_task = job.candidates.count == 1
         #: Pairs of edges that leave one node: what a walk through all tasks goes over.
-        degrees = (space.out_degrees.astype(float) for space in candidates.spaces)
+        degrees = (space.out_degrees.astype(float) for space in job.candidates.spaces)
         self._pairs = sum(int((degree**2).sum()) for degree in degrees)
         self._is_dear = self._pairs > _DEAR
         self._merges = 0
@@ -145,7 +143,8 @@ class MinimalSearch:
     def _partitions(self) -> Partitions:
         languages = self.languages
         # Without a common step proofs are long, and longer with Glucose.
-        prover: SolverName = "cadical195" if self._is_asynchronous else "glucose42"
+        is_asynchronous = self._job.candidates.model.is_asynchronous
+        prover: SolverName = "cadical195" if is_asynchronous else "glucose42"
         return Partitions(self._job.states, languages.clauses, languages.group.permutations, prover)
 
     @cached_property
@@ -172,10 +171,8 @@ class MinimalSearch:
             return []
         from coordlang.vocabulary.contained import parts, tasks_of_one_orbit
 
-        found = [
-            *tasks_of_one_orbit(candidates, group, self._job.seed),
-            *parts(candidates, group, self._job.seed),
-        ]
+        found = tasks_of_one_orbit(candidates, group, self._job.seed)
+        found += parts(candidates, group, self._job.seed)
         return sorted(found, key=lambda instance: len(instance.states))
 
     @property
@@ -392,10 +389,8 @@ class MinimalSearch:
         return None
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
-        """The best language, with what is proved.  Raises ``stopped`` if there is none."""
-        if self.best is None:
-            assert stopped is not None
-            raise stopped
+        """The best language, with what is proved."""
+        assert self.best is not None
         figures: dict[str, float] = {}
         refuting, languages = self.refuting, self.__dict__.get("languages")
         if languages is not None:

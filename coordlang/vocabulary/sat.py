@@ -7,9 +7,9 @@ A clause with fewer pairs asks for more, and implies every clause that holds its
 from __future__ import annotations
 
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import product, repeat
+from itertools import chain, product, repeat
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,7 @@ def without_implied(clauses: Iterable[Clause], comparisons: int = sys.maxsize) -
 
 def most_frequent_pairs(clauses: Iterable[Clause], number: int) -> list[Pair]:
     """The pairs that most clauses hold, at most ``number``, the most frequent first."""
-    frequency = Counter(states for clause in clauses for states in clause)
+    frequency = Counter(chain.from_iterable(clauses))
     return sorted(frequency, key=lambda p: (-frequency[p], p))[:number]
 
 
@@ -52,21 +52,19 @@ def most_constrained_first(states: Iterable[int], clauses: Iterable[Clause]) -> 
 
     A pair counts for both its states, with the share that it has in its clause.
     """
-    demand: dict[int, float] = {}
+    demand = defaultdict[int, float](float)
     for clause in clauses:
-        for states_of_pair in clause:
-            for state in states_of_pair:
-                demand[state] = demand.get(state, 0.0) + 1 / len(clause)
-    return sorted(states, key=lambda s: (-demand.get(s, 0.0), s))
+        for state in chain(*clause):
+            demand[state] += 1 / len(clause)
+    return sorted(states, key=lambda s: (-demand[s], s))
 
 
 def clique(edges: Iterable[Pair]) -> list[int]:
     """A large clique, by greedy search from any state: its states need words of their own."""
-    near: dict[int, set[int]] = {}
+    near = defaultdict[int, set[int]](set)
     for a, b in sorted(edges):
-        near.setdefault(a, set()).add(b)
-        near.setdefault(b, set()).add(a)
-
+        near[a].add(b)
+        near[b].add(a)
     best: list[int] = []
     for start in sorted(near):
         clique, candidates = [start], set(near[start])
@@ -312,11 +310,7 @@ class Undecided(Exception):
     """The conflicts allowed are used up, and the formula is not decided."""
 
 
-def satisfiable(
-    solver: Any,
-    assumptions: Sequence[int] = (),
-    conflicts: int | None = None,
-) -> bool:
+def satisfiable(solver: Any, assumptions: Sequence[int] = (), conflicts: int | None = None) -> bool:
     """Whether the clauses of a solver of python-sat can be satisfied.
 
     ``solver``: made by `planners.search.sat.sat_solver`; signals are heard between slices of its

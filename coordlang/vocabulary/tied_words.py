@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from copy import copy
 from itertools import tee
 
 import numpy as np
@@ -47,15 +48,11 @@ class TiedWords:
         self._is_one_task = job.candidates.count == 1
         self._first = _OF_ONE if self._is_one_task else _OF_MANY
         #: Which states share a word, kind by kind; each size goes through a copy of it.
-        self._tied = self._classes(job)
+        (self._tied,) = tee(self._classes(job), 1)
         #: Those of the solvers so far on kinds that stayed undecided.
         self.conflicts = 0
         #: Of each number of words the kinds that were not looked at, and those that are undecided.
         self._kinds: dict[int, tuple[Iterator[_Kind], deque[_Kind]]] = {}
-
-    def _every(self) -> Iterator[Ints]:
-        self._tied, every = tee(self._tied)
-        return every
 
     def _classes(self, job: Job) -> Iterator[Ints]:
         """(states) which states share a word, kind by kind: those with few classes first.
@@ -73,7 +70,7 @@ class TiedWords:
 
     def of_facts(self) -> Assignment | None:
         """Of one task the language that says the steps to go and a few facts, if there is one."""
-        classes = next(self._every(), None)
+        classes = next(copy(self._tied), None)
         if classes is None:
             return None
         return dict(zip(self._states.tolist(), classes[self._states].tolist(), strict=True))
@@ -107,7 +104,7 @@ class TiedWords:
 
     def _new_kinds(self, size: int) -> Iterator[_Kind]:
         random = self._random if self._is_one_task else None
-        for classes in self._every():
+        for classes in copy(self._tied):
             yield _Kind(self._states, classes, size, self._images, self._first, random)
 
     @property
