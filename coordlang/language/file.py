@@ -324,13 +324,10 @@ def _faults_of_words(record: LanguageRecord) -> Iterator[Fault]:
     for word in record.words:
         if word.split() != [word]:
             yield f"{echoed(word)} is no word", "Words are not empty and have no blanks in them."
-    if not {*record.states.values(), record.default} <= words:
-        given = [*record.states.items(), ("default", record.default)]
-        key, word = next((key, word) for key, word in given if word not in words)
-        yield (
-            f"{echoed(word)} (of {echoed(key)}) is not among the words",
-            "Add it to 'words', or give the state one of them.",
-        )
+    for key, word in (*record.states.items(), ("default", record.default)):
+        if word not in words:
+            what = f"{echoed(word)} (of {echoed(key)}) is not among the words"
+            yield what, "Add it to 'words', or give the state one of them."
 
 
 def _faults_of_guarantee(g: Guarantee, size: int) -> Iterator[Fault]:

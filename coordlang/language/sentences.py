@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
@@ -25,11 +26,7 @@ _MOST, _ADDITIONS = 100_000, 5_000_000
 
 def sentence(words: Iterable[int]) -> Sentence:
     """The words of a state sequence, repeated neighbours collapsed (the paper's TSC of a plan)."""
-    result: list[int] = []
-    for word in words:
-        if not result or result[-1] != word:
-            result.append(word)
-    return tuple(result)
+    return tuple(word for word, _ in groupby(words))
 
 
 @dataclass(frozen=True, slots=True)

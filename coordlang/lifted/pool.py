@@ -70,22 +70,18 @@ def pool_of(states: Sequence[States], most: int, landmarks: bool = False) -> Poo
     concepts = _concepts(vocabulary, states, most)
     found = set(_numbers(vocabulary, concepts, most))
     numbers = _different_numbers(found, states)
-    kept: list[Feature] = []
-    table: list[Ints] = []
-    seen: set[bytes] = set()
-    tried = len(concepts) + len(found)
     features = {one for one in _features(vocabulary, numbers, most) if one.complexity <= most}
+    kept: dict[bytes, tuple[Feature, Ints]] = {}
     for feature in sorted(features, key=_simplest):
-        tried += 1
         # Not kept in states: there are many features, of which few are used.
         values = np.concatenate([feature(own) for own in states])
         key, classes = _partition(values)
-        if classes > 1 and key not in seen:
-            seen.add(key)
-            kept.append(feature)
-            table.append(values)
-    shape = len(kept), sum(map(len, states))
-    return Pool(tuple(kept), np.array(table, np.int64).reshape(shape), tried)
+        if classes > 1:
+            kept.setdefault(key, (feature, values))
+    table = np.array([values for _, values in kept.values()], np.int64)
+    tried = len(concepts) + len(found) + len(features)
+    simplest = tuple(feature for feature, _ in kept.values())
+    return Pool(simplest, table.reshape(len(kept), sum(map(len, states))), tried)
 
 
 def _simplest(one: Feature | Number) -> tuple[int, str]:
@@ -182,18 +178,16 @@ def _numbers(vocabulary: _Vocabulary, concepts: Sequence[Concept], most: int) ->
 
 def _different_numbers(found: Iterable[Number], states: Sequence[States]) -> list[Number]:
     """The simplest of equal numbers; none that is the same in all states."""
-    kept = []
-    seen: set[bytes] = set()
+    kept: dict[bytes, Number] = {}
     for number in sorted(found, key=_simplest):
         parts = [number(own) for own in states]
         values = np.concatenate(parts)
         key = values.astype(np.int32).tobytes()
-        if key not in seen and len(values) and (values != values[0]).any():
-            seen.add(key)
-            kept.append(number)
+        if key not in kept and len(values) and (values != values[0]).any():
+            kept[key] = number
             for own, part in zip(states, parts, strict=True):
                 own.known[number,] = part
-    return kept
+    return [*kept.values()]
 
 
 def _concepts(vocabulary: _Vocabulary, states: Sequence[States], most: int) -> list[Concept]:

@@ -74,7 +74,7 @@ class World(Asked):
                 types.setdefault(kind, set()).add(name)
         self.types = dict(sorted(types.items()))
         given = {n: p for n, p in (points or {}).items() if n in problem.objects}
-        self.points = _points(self.statics, given)
+        self.points = _points(self.relations, given)
         self.known: dict[object, Any] = {}
 
     @classmethod
@@ -180,13 +180,12 @@ def named_objects(worlds: Sequence[World], landmarks: bool = False) -> tuple[str
 
 
 def _points(
-    statics: Mapping[str, Sequence[tuple[str, ...]]], known: Mapping[str, Point]
+    relations: Mapping[str, Sequence[Pair]], known: Mapping[str, Point]
 ) -> dict[str, Point]:
     """Coordinates of the objects that static relations link: the known ones, else by names."""
     points = dict(known)
-    for tuples in statics.values():
-        links = [(args[0], args[1]) for args in tuples if len(args) == 2]
-        names = sorted({name for link in links for name in link})
+    for links in relations.values():
+        names = sorted({*chain(*links)})
         if not known.keys() >= set(names):
             points = (from_names(names, links) or {}) | points
     return points

@@ -156,13 +156,7 @@ class MinimalSearch:
         """Who asks for all pairs of plans of one task; None where clauses must prove it."""
         if self._job.by_clauses or not self._is_one_task:
             return None
-        return OneTask(
-            self._job,
-            self.languages,
-            lambda: (self.lower, self.upper),
-            lambda: self._left,
-            self._report,
-        )
+        return OneTask(self._job, self.languages, self._bounds, lambda: self._left, self._report)
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
@@ -180,6 +174,9 @@ class MinimalSearch:
         """The number of words that is known to suffice."""
         return len(self._job.states) if self.best is None else word_count(self.best)
 
+    def _bounds(self) -> tuple[int, int]:
+        return self.lower, self.upper
+
     def run(self) -> None:
         """Close the bounds."""
         if not self._job.first_differences.requiring:
@@ -195,7 +192,7 @@ class MinimalSearch:
                 break
         self.merge(_VAIN)
         known = self.best
-        close_bounds(lambda: (self.lower, self.upper), self._narrow, lambda: self._is_spent)
+        close_bounds(self._bounds, self._narrow, lambda: self._is_spent)
         if self.best is known and not self._is_spent:
             # Merged words tell more states apart than a language must: fewer leave more plans open.
             self.decide(self.lower, Budget())
@@ -300,12 +297,12 @@ class MinimalSearch:
         """`decide`; between the bounds, look for languages that are sooner found first."""
         if size == self.lower:
             return self.decide(size, budget)
-        bounds = self.lower, self.upper
+        bounds = self._bounds()
         if self._is_one_task:
             self._find_fewer_tied(budget.rounds)
-        if bounds == (self.lower, self.upper):
+        if bounds == self._bounds():
             self.merge(_VAIN)
-        return bounds != (self.lower, self.upper) or self.decide(size, budget)
+        return bounds != self._bounds() or self.decide(size, budget)
 
     def decide(self, size: int, budget: Budget) -> bool:
         """Find a language of ``size`` words, or prove that there is none; False: not yet."""

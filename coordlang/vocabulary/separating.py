@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
+from functools import cache
 
 import numpy as np
 
@@ -190,12 +191,9 @@ class _Search:
 
 def constraints(differences: Iterable[tuple[Difference, Difference]]) -> Iterator[Constraint]:
     """What first and last differences of plans ask (Theorem 3): separate the one or the other."""
-    known: dict[Difference, Constraint] = {}
+    made = cache(lambda difference: alternatives(difference[0], difference[1:]))
     for first, last in differences:
-        for difference in (first, last):
-            if difference not in known:
-                known[difference] = alternatives(difference[0], difference[1:])
-        yield _ordered({*known[first], *known[last]})
+        yield _ordered({*made(first), *made(last)})
 
 
 def _ordered(alternatives: Iterable[Clause]) -> Constraint:

@@ -213,7 +213,8 @@ def classes_by_facts(candidates: Candidates, languages: Languages) -> Iterator[I
     steps[space.state] = space.layer
     if (steps[space.state] != space.layer).any():
         return
-    facts, chosen = _changing_facts(candidates), list[int]()
+    true = candidates.model.codec.truth(candidates.rows).T
+    facts, chosen = true[true.any(axis=1) & ~true.all(axis=1)], list[int]()
     left = np.ones(len(facts), np.bool_)
     while (found := _deciding(facts, left, steps, languages)) is not None:
         left[found] = False
@@ -245,12 +246,6 @@ def _differing(facts: Bools, sequences: Ints) -> Bools:
     values = facts[:, sequences]
     differ = (values != values[:, :, :1]).any(axis=(2, 3))
     return np.unique(differ.T, axis=0)
-
-
-def _changing_facts(candidates: Candidates) -> Bools:
-    """(facts, states) the facts that are true in some states only."""
-    true = candidates.model.codec.truth(candidates.rows)
-    return true.T[true.any(axis=0) & ~true.all(axis=0)]
 
 
 def _classes(steps: Ints, facts: Bools) -> Ints:
