@@ -176,7 +176,9 @@ def provenance_of(
         tasks["states_sha256"] = states_sha256(candidates)
     else:
         tasks["tasks"] = task_data(candidates.listed)
-    fluents = key_predicates(domain, options.remember_actions, options.words_see_slack)
+    besides = {"last"} if options.remember_actions else set()
+    besides |= {SLACK_LEFT} if options.words_see_slack else set()
+    fluents = sorted(fluent_predicates(domain) | besides)
     return Provenance(
         robots=loaded.model.robots,
         guarantee=guarantee,
@@ -194,12 +196,6 @@ def provenance_of(
         tolerance=Tolerance(slack=options.slack) if options.slack else None,
         producer=producer,
     )
-
-
-def key_predicates(domain: Domain, remember_actions: bool, sees_slack: bool = False) -> list[str]:
-    """The predicates of the atoms that a state key may hold, sorted."""
-    more = ({"last"} if remember_actions else set()) | ({SLACK_LEFT} if sees_slack else set())
-    return sorted(fluent_predicates(domain) | more)
 
 
 def domain_sha256(domain: Domain) -> str:

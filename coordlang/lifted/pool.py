@@ -115,11 +115,10 @@ class _Vocabulary:
         self.sets = sorted(sets - {str(Everything())})  # what is called so is not read back
 
     def terms(self) -> Iterator[Term]:
-        for predicate, arity in self.fluents:
+        for (predicate, arity), name in product(self.fluents, self.named):
             if arity == 2:
-                for name in self.named:
-                    yield Term(predicate, name)
-                    yield Term(predicate, name, inverse=True)
+                yield Term(predicate, name)
+                yield Term(predicate, name, inverse=True)
 
     def roles(self) -> Iterator[Role]:
         binary = [name for name, arity in self.fluents if arity == 2]

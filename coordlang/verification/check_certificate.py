@@ -67,17 +67,7 @@ def check(
     separates a pair on every reason's paths. Raises `Refuted` with the reason that is wrong, and
     `OutOfMemory` before a formula is made that would not fit.
     """
-    if tuple(certificate.robots) != candidates.model.robots:
-        raise Refuted(
-            f"the certificate is about other robots: {', '.join(certificate.robots)}",
-            remedy=_ITS_FILES,
-        )
-    domain = candidates.loaded.domain.name
-    if certificate.domain != domain:
-        raise Refuted(
-            f"the certificate is about the domain {echoed(certificate.domain)}, not {domain!r}",
-            remedy=_ITS_FILES,
-        )
+    _require_same(certificate, candidates)
     if certificate.refuted < 0:
         raise Refuted(f"the certificate speaks of {certificate.refuted} words", remedy=_REBUILD)
     tasks = _tasks(candidates)
@@ -104,6 +94,18 @@ def check(
         )
     names = {state: candidates.model.codec.key(candidates.rows[state]) for state in cnf.word}
     return Checked(certificate.refuted + 1, len(clauses), cnf, names)
+
+
+def _require_same(certificate: Certificate, candidates: Candidates) -> None:
+    """Raise `Refuted` for a certificate about other robots, or another domain."""
+    wanted, domain = certificate.domain, candidates.loaded.domain.name
+    if tuple(certificate.robots) != candidates.model.robots:
+        what = f"other robots: {', '.join(certificate.robots)}"
+    elif wanted != domain:
+        what = f"the domain {echoed(wanted)}, not {domain!r}"
+    else:
+        return
+    raise Refuted(f"the certificate is about {what}", remedy=_ITS_FILES)
 
 
 def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:

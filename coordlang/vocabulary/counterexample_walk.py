@@ -82,8 +82,6 @@ class CounterexampleWalk:
 
     def failing(self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize) -> list[Ints]:
         """See `Mixtures.failing`: the fewest differences, and drawn ones, whatever ``steps``."""
-        if not self._choices.requires[self._space.starts].any():
-            return []
         layers, most = self._layers(word), max(most, _LEAST)
         # Columns: fewest steps at which the plans differ, steps to go, row of the layer.
         starts = [np.zeros((0, 3), np.int64)]

@@ -78,9 +78,6 @@ class Mixtures:
         times as many are wanted from each node: it stands for so many images.  ``steps``: steps of
         robots that may be looked at.  Raises `Undecided` after so many steps.
         """
-        space = self._space
-        if not self._choices.requires[space.starts].any():
-            return []
         if len(self._shared) + len(self._safe) + len(self._options) + len(self._spoken) > _KEPT:
             self._forget()
         self._spoken.say(word)
@@ -97,7 +94,7 @@ class Mixtures:
         self._failed.update(found.keys())
         by_steps = defaultdict[int, list[_Plans]](list)
         for node in sorted(found):
-            by_steps[int(space.layer[node])] += found[node]
+            by_steps[int(self._space.layer[node])] += found[node]
         return [np.array(own, np.int64).transpose(0, 2, 1) for own in by_steps.values()]
 
     def _first_of_nodes(self, most: int, random: Random) -> dict[int, list[_Plans]]:
