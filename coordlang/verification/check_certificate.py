@@ -109,7 +109,7 @@ def _require_same(certificate: Certificate, candidates: Candidates) -> None:
 
 
 def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:
-    """The pairs of states one of which must be separated; `check` says what to do about errors."""
+    """The pairs of states one of which must be separated."""
     row = candidates.model.codec.encode(reason.init)
     state = int(find_rows(candidates.rows, row[None, :])[0])
     goal = _canonical(chain(*map(split_atoms, reason.goal)))
@@ -121,12 +121,14 @@ def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:
     space, start = tasks[state, goal]
     robots = len(space.model.robots)
     if len(reason.plans) != robots:
-        raise Refuted(f"expected a plan for each of {robots} robots")
+        raise Refuted(f"expected a plan for each of {robots} robots", remedy=_REBUILD)
     states = []
     for number, plan in enumerate(reason.plans):
         passed = _follow(space, start, plan)
         if passed is None:
-            raise Refuted(f"plan {number} is no {space.model.kept_plan} of the task")
+            raise Refuted(
+                f"plan {number} is no {space.model.kept_plan} of the task", remedy=_REBUILD
+            )
         states.append(passed)
     mixture = [
         [own[robot] for robot, own in enumerate(step)] for step in zip(*reason.plans, strict=True)
@@ -134,11 +136,12 @@ def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:
     if _follow(space, start, mixture) is not None:
         raise Refuted(
             f"the mixture of its plans is one of the {space.model.kept_plans}: they need no "
-            "separation"
+            "separation",
+            remedy=_REBUILD,
         )
     cells = [_different_cells(path, states) for path in reason.paths]
     if not _joins_all([path.plans for path in reason.paths], robots):
-        raise Refuted("its warping paths do not join all of its plans")
+        raise Refuted("its warping paths do not join all of its plans", remedy=_REBUILD)
     return frozenset(chain(*cells))
 
 
@@ -146,14 +149,15 @@ def _different_cells(path: WarpingPath, states: Sequence[Sequence[int]]) -> set[
     """The pairs of different states on the cells of a path; ``states`` by plan."""
     a, b = path.plans
     if not (0 <= a < len(states) and 0 <= b < len(states)):
-        raise Refuted(f"there are no plans {a} and {b}")
+        raise Refuted(f"there are no plans {a} and {b}", remedy=_REBUILD)
     one, other = states[a], states[b]
     ends = [(0, 0), (len(one) - 1, len(other) - 1)]
     steps = {(c - a, d - b) for (a, b), (c, d) in pairwise(path.cells)}
     is_between = bool(path.cells) and [path.cells[0], path.cells[-1]] == ends
     if not is_between or not steps <= {(0, 1), (1, 0), (1, 1)}:
         raise Refuted(
-            f"the path of plans {a} and {b} is no warping path from {ends[0]} to {ends[1]}"
+            f"the path of plans {a} and {b} is no warping path from {ends[0]} to {ends[1]}",
+            remedy=_REBUILD,
         )
     return {pair(one[i], other[j]) for i, j in path.cells if one[i] != other[j]}
 
