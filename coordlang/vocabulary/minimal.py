@@ -156,7 +156,8 @@ class MinimalSearch:
         """Who asks for all pairs of plans of one task; None where clauses must prove it."""
         if self._job.by_clauses or not self._is_one_task:
             return None
-        return OneTask(self._job, self.languages, self._bounds, lambda: self._left, self._report)
+        known = self.languages
+        return OneTask(self._job, known, self._bounds, self._left, self._holds, self._report)
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
@@ -232,7 +233,7 @@ class MinimalSearch:
         if not self._is_open:
             return
         if self._one_task is not None:
-            for found in self._one_task.in_step(self._holds, rounds):
+            for found in self._one_task.in_step(rounds):
                 self._offer(found)
         least = self.lower
         if not self._is_dear and least < self.upper:
@@ -255,7 +256,6 @@ class MinimalSearch:
             conflicts += self._one_task.work
         return conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
 
-    @property
     def _left(self) -> int:
         """Conflicts that may still be spent."""
         return max(0, self._most - self.work)
@@ -266,7 +266,7 @@ class MinimalSearch:
 
     @property
     def _is_spent(self) -> bool:
-        return self._left == 0
+        return self._left() == 0
 
     def merge(self, vain: int = sys.maxsize, most: int = sys.maxsize) -> None:
         """Merge words of the best language as long as it stays a language.
@@ -331,9 +331,9 @@ class MinimalSearch:
 
         None of them where pairs of plans do.
         """
-        ways = [self._by_clauses, self._by_pairs]
-        if size > 2 and self._one_task is not None and self._one_task.has_formula:
-            ways.reverse()
+        ways = [self._by_clauses]
+        if (one_task := self._one_task) is not None:
+            ways.insert(0 if size > 2 and one_task.has_formula else 1, one_task.find)
         for way in ways:
             with suppress(Undecided):
                 found = way(size, budget)
@@ -353,15 +353,9 @@ class MinimalSearch:
         def partition(conflicts: int) -> dict[int, int] | None:
             if self._is_spent:
                 raise Undecided
-            return self._partitions.find(size, min(conflicts, self._left))
+            return self._partitions.find(size, min(conflicts, self._left()))
 
         return find(partition, self._holds, budget)
-
-    def _by_pairs(self, size: int, budget: Budget) -> dict[int, int] | None:
-        """The same by what is said of all pairs of plans of one task."""
-        if self._one_task is None:
-            raise Undecided
-        return self._one_task.find(size, self._holds, budget)
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""

@@ -61,7 +61,8 @@ class OneTask:
     """The searches for words of one task that ask for all pairs of its plans at once.
 
     ``bounds`` gives the number of words proved to be needed and the number known to suffice,
-    ``left`` the conflicts that may still be spent; ``report`` tells what is looked for.
+    ``left`` the conflicts that may still be spent; ``holds`` says whether a partition is a
+    language, ``report`` tells what is looked for.
     """
 
     def __init__(
@@ -70,11 +71,12 @@ class OneTask:
         languages: Languages,
         bounds: Callable[[], tuple[int, int]],
         left: Callable[[], int],
+        holds: Callable[[dict[int, int]], bool],
         report: Callable[[str], None],
     ) -> None:
         (space,) = job.candidates.spaces
         self._states, self._clauses, self._seed = job.states, languages.clauses, job.seed
-        self._bounds, self._left, self._report = bounds, left, report
+        self._bounds, self._left, self._holds, self._report = bounds, left, holds, report
         self._pairs = PlanPairs(Choices(space))
         self._two_words = TwoWords(self._pairs, self._states, self._clauses)
         #: Searches for stutter-free words, made one after another.
@@ -101,23 +103,22 @@ class OneTask:
         """Whether so many words have a formula; for more than two it is made."""
         return size == 2 or self._apart is not None
 
-    def find(
-        self, size: int, holds: Callable[[dict[int, int]], bool], budget: Budget
-    ) -> dict[int, int] | None:
-        """The first partition into so many words that ``holds``, None if there is none.
+    def find(self, size: int, budget: Budget) -> dict[int, int] | None:
+        """A language of so many words, None if there is none.
 
         Raises `Undecided` where the ``budget`` is not enough, or there is no formula.
         """
         rounds, left = budget.rounds, self._left()
         if size == 2:
             own = Budget(rounds, min(_FOR_TWO * rounds, left))
-            return self._two_words.find(holds, own, self._room(_PAIRS_OF_ROUND * rounds, _PAIRS))
+            room = self._room(_PAIRS_OF_ROUND * rounds, _PAIRS)
+            return self._two_words.find(self._holds, own, room)
         if (apart := self._apart) is None:
             raise Undecided
         own = Budget(rounds, min(_FOR_MORE * rounds, left))
-        return find(partial(apart.find, size, size + _FURTHER), holds, own)
+        return find(partial(apart.find, size, size + _FURTHER), self._holds, own)
 
-    def in_step(self, holds: Callable[[dict[int, int]], bool], effort: int) -> Iterator[Assignment]:
+    def in_step(self, effort: int) -> Iterator[Assignment]:
         """Languages of fewer and fewer stutter-free words, that tell all pairs apart step by step.
 
         From below, at most twice the number that was tried last: small ones are soon decided.
@@ -134,7 +135,7 @@ class OneTask:
                     room = size
                 found = None
                 with suppress(Undecided):
-                    found = find(partial(search.find, size, room), holds, own)
+                    found = find(partial(search.find, size, room), self._holds, own)
                 if found is None:
                     least, most = size + 1, 2 * size
                 else:
