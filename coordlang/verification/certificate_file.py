@@ -20,7 +20,6 @@ from planners.system.limits import memory_left, more_memory
 from planners.system.writing import write_compressed
 
 FORMAT = "coordlang/certificate"
-VERSION = 1
 
 #: One plan: for each joint step each robot's subaction, None for idling.
 PlanTexts = list[list[str | None]]
@@ -67,11 +66,11 @@ class Certificate(msgspec.Struct, frozen=True):
     refuted: Annotated[int, doc("A number of words that is too small.")]
     reasons: Annotated[list[Reason], doc("Why it is, all together.")]
     format: Annotated[str, doc("What kind of file this is.")] = FORMAT
-    version: Annotated[int, doc("Readers refuse a version that they do not know.")] = VERSION
+    version: Annotated[int, doc("Readers refuse a version that they do not know.")] = 1
     producer: Annotated[dict[str, Any], doc("Who wrote it; for information.")] = {}
 
 
-CERTIFICATE = FileFormat("certificate", "certificate", Certificate, FORMAT, VERSION)
+CERTIFICATE = FileFormat("certificate", "certificate", Certificate, FORMAT)
 
 
 def write_certificate(certificate: Certificate, path: str | Path) -> None:

@@ -70,9 +70,6 @@ class SequenceSets:
         self._numbers: dict[tuple[tuple[int, int], ...], int] = {(): 0}
         self._unions: dict[tuple[int, ...], int] = {}
 
-    def __len__(self) -> int:
-        return len(self.moves)
-
     def number(self, moves: Iterable[tuple[int, int]]) -> int:
         """The set with these first members, in ascending order, and what follows each."""
         key = tuple(moves)
@@ -187,7 +184,7 @@ class SetWalk:
         self._edges = EdgeTrees(space)
 
         def so_far() -> str:
-            return f"{len(self._steps):,} sets of what robots can do and say"
+            return f"{len(self._steps.moves):,} sets of what robots can do and say"
 
         with reaching(so_far, space.model.smaller("smaller tasks")):
             self._of = self._sets_of_nodes()
