@@ -16,7 +16,7 @@ import numpy as np
 
 from coordlang.sites.coordinates import Point, from_names
 from coordlang.sites.world import World
-from planners.system.errors import BadInput
+from planners.system.errors import BadInput, UsageError
 
 #: A wall: (x, y) of one end, (x, y) of the other, in metres.
 Wall = tuple[float, float, float, float]
@@ -45,6 +45,17 @@ class Floor:
         moves = (link.ends for link in world.links if link.moves)
         lengths = [math.dist(self.points[a], self.points[b]) for a, b in moves]
         self.longest, self.shortest = max(lengths, default=0.0), min(lengths, default=math.inf)
+
+
+def require_room(floor: Floor, radius: float) -> None:
+    """Raise `UsageError` if robots of this radius, in metres, are too large for the floor."""
+    most = MOST_RADIUS * floor.shortest
+    if radius > most:
+        raise UsageError(
+            f"robots with a radius of {radius:g} m are too large for places {floor.shortest:g} m "
+            "apart: they touch where one leaves a place at a right angle to the one that comes",
+            remedy=f"Their radius may be {most:g} at most.",
+        )
 
 
 def outlines(walls: Sequence[Wall]) -> list[list[Point]]:

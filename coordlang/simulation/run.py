@@ -11,7 +11,7 @@ from random import Random
 from typing import Any
 
 from coordlang.language.candidates import describe
-from coordlang.simulation.floor import Floor
+from coordlang.simulation.floor import Floor, require_room
 from coordlang.simulation.record import (
     FORMAT,
     VERSION,
@@ -43,8 +43,9 @@ def runs_of(
 
     ``floor`` has the places of the mission's world; ``wishes`` are what robots come to want on the
     way.  The same seed gives the same run; O(robots * ticks).  Raises `UsageError` if ir-sim is not
-    installed.
+    installed, or the robots are too large for the floor.
     """
+    require_room(floor, settings.radius)
     for further in range(number):
         going = _Going(mission, floor, settings, seed + further, wishes)
         while not going.has_ended:

@@ -11,10 +11,10 @@ from unittest.mock import Mock
 import pytest
 
 import coordlang
-from coordlang.simulation.floor import Floor, outlines
+from coordlang.simulation.floor import Floor, outlines, require_room
 from coordlang.simulation.recording import RECORDINGS
 from coordlang.sites.world import Link, World
-from planners.system.errors import BadInput, Note
+from planners.system.errors import BadInput, Note, UsageError
 from planners.system.signals import Interrupted
 from tests.support.domains import files_of
 from tests.support.hall import DOMAIN, PROBLEM
@@ -150,3 +150,10 @@ def test_outlines_draw_every_wall_and_nothing_else(folder: str) -> None:
     assert len(lines) == 1, "the walls around one floor are connected"
     drawn = {frozenset(pair) for line in lines for pair in pairwise(line)}
     assert drawn == {frozenset((wall[:2], wall[2:])) for wall in walls}
+
+
+def test_robots_that_are_too_large_are_an_error() -> None:
+    floor = floor_for(mission_of("t-map"))
+    require_room(floor, 0.25)
+    with pytest.raises(UsageError, match=r"radius may be 0\.25 at most"):
+        require_room(floor, 0.26)
