@@ -38,6 +38,7 @@ from coordlang.language.sentences import Sentence, sentence
 from coordlang.language.words import Partition
 from coordlang.required.choices import Choices, LabelSets
 from planners.joint.tables import Ints
+from planners.search.graphs import csgraph
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.search.portions import estimate
@@ -394,8 +395,10 @@ def failures_under(
 def wilson(successes: int, runs: int) -> tuple[float, float]:
     """Return the 95 % confidence interval of a proportion, by Wilson's score (1927).
 
-    Raises `ValueError` without runs, or if there are not between 0 and ``runs`` successes.
+    Raises `ValueError` without runs, or if there are not between 0 and ``runs`` successes, and
+    `OutOfMemory` where there is no room for scipy.
     """
+    csgraph()  # it is loaded only where it fits
     from scipy.stats import binomtest
 
     low, high = binomtest(successes, runs).proportion_ci(method="wilson")
