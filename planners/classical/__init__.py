@@ -18,10 +18,11 @@ effects are worked out anew here.
 
 from __future__ import annotations
 
-from planners.classical.explicit import TooManyError, explicit
+from planners.classical.explicit import explicit
 from planners.classical.selection import select_then_apply
 from planners.classical.selectors import selectors_of
 from planners.classical.task import LONGEST, ClassicalTask, Form
+from planners.classical.writer import TooManyError, goal_formula
 from planners.joint.model import JointModel, PlanningTask, show
 
 
@@ -35,15 +36,15 @@ def compile_classical(
     up to which `ClassicalTask.cost` has to be sure.
     """
     team = selectors_of(model)
-    step_cost = team.highest_cost * longest + 1
+    step_cost, goal = team.highest_cost * longest + 1, goal_formula(model, task.goal)
     if model.is_joint_action and limit:
         limit = max(limit, 4 * len(model.actions))
     form: Form = "explicit"
     try:
-        out = explicit(team, model, task.goal, step_cost, limit)
+        out = explicit(team, model, goal, step_cost, limit)
     except TooManyError:
         form = "select-then-apply"
-        out = select_then_apply(team, model, task.goal, step_cost)
+        out = select_then_apply(team, model, goal, step_cost)
     return ClassicalTask(
         name=task.name,
         form=form,

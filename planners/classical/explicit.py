@@ -3,71 +3,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
-from planners.classical.selectors import Selectors
+from planners.classical.selectors import Selectors, in_step
 from planners.classical.task import Known
-from planners.classical.writer import (
-    Writer,
-    goal_formula,
-    known_literals,
-    own_fact,
-    state_reader,
-)
-from planners.joint.model import Goal, JointModel
-from planners.pddl.formula_tree import GroundLeaf, joined, literals, negated, substituted
-from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, StepAtom, Truth
+from planners.classical.writer import TooManyError, Writer, known_literals
+from planners.joint.model import JointModel
+from planners.pddl.formula_tree import GroundLeaf, joined, literals, substituted
+from planners.pddl.lifted import TRUE, And, Atom, Effect, Formula, StepAtom, Truth
 
 
-class TooManyError(Exception):
-    """The explicit form is larger than its limit."""
-
-
-def explicit(team: Selectors, model: JointModel, goal: Goal, step_cost: int, limit: int) -> Writer:
+def explicit(
+    team: Selectors, model: JointModel, goal: Formula, step_cost: int, limit: int
+) -> Writer:
     """One action per joint action, and case of its disjunctions and conditional effects."""
-    out = Writer(model.codec.facts)
-    if not limit:
-        raise TooManyError
+    out = Writer(model.codec.facts, limit)
     for step in _joint_steps(team, limit):
         parts, cost = _parts(team, step), step_cost + team.second_cost(step)
         name = " ".join(part or "idle" for part in parts)
-        for known, adds, deletes in _cases_of(team, model, step):
+        for known, fired in _cases_of(team, step):
+            adds = {effect.atom for effect in fired if effect.adds}
+            deletes = {effect.atom for effect in fired} - adds
             out.action(name, known, adds, deletes, cost, tuple(enumerate(parts)))
-            if len(out.actions) > limit:
-                raise TooManyError
-    found = known_literals(wanted := goal_formula(model, goal))
-    if found and not found[1]:
-        out.goal = out.conditions(found[0])
-        return out
-    done = own_fact("goal reached")
-    out.goal = out.conditions({done: True})
-    for known in _split({}, [wanted], []):
-        out.action("reach the goal", {**known, done: False}, (done,), ())
-        if len(out.actions) > limit:
-            raise TooManyError
+    if (done := out.end(goal, {})) is not None:
+        for known in _split({}, goal, []):
+            out.action("reach the goal", {**known, done: False}, (done,), ())
     return out
 
 
 def _joint_steps(team: Selectors, limit: int) -> list[tuple[int, ...]]:
     """Sets of actions that owners and interference allow; `TooManyError` beyond a limit."""
+    if not limit:
+        raise TooManyError
     partial: list[tuple[int, ...]] = [()]
-    for robot, idling in enumerate(team.idling):
-        first = [n for n, owners in enumerate(team.owners) if owners[0] == robot]
+    for robot in range(len(team.names)):
         grown: list[tuple[int, ...]] = []
         for step in partial:
-            taken = {owner for n in step for owner in team.owners[n]}
-            if robot in taken or idling is not None:
-                grown.append(step)
-            if robot not in taken:
-                grown += [
-                    (*step, n)
-                    for n in first
-                    if taken.isdisjoint(team.owners[n]) and team.clashes[n].isdisjoint(step)
-                ]
+            grown += _with_choices(team, step, robot)
             if len(grown) > limit:
                 raise TooManyError
         partial = grown
     return partial
+
+
+def _with_choices(team: Selectors, step: tuple[int, ...], robot: int) -> Iterator[tuple[int, ...]]:
+    """A set of actions of the robots before, with what this one may choose first."""
+    taken = {owner for number in step for owner in team.owners[number]}
+    if robot in taken or team.idling[robot] is not None:
+        yield step
+    for number, owners in enumerate(team.owners):
+        is_free = owners[0] == robot and taken.isdisjoint(owners)
+        if is_free and team.clashes[number].isdisjoint(step):
+            yield (*step, number)
 
 
 def _parts(team: Selectors, step: Sequence[int]) -> Sequence[str | None]:
@@ -77,53 +65,45 @@ def _parts(team: Selectors, step: Sequence[int]) -> Sequence[str | None]:
     return whole or [chosen.get(robot) for robot in range(len(team.names))]
 
 
-def _cases_of(
-    team: Selectors, model: JointModel, step: Sequence[int]
-) -> Iterator[tuple[Known, set[Atom], set[Atom]]]:
-    """The disjoint cases in which a joint action is applicable, as (known, adds, deletes)."""
-    chosen = {StepAtom(team.actions[n].schema, team.actions[n].args) for n in step}
-    on_state = state_reader(model)
+def _cases_of(team: Selectors, step: Sequence[int]) -> Iterator[tuple[Known, list[Effect]]]:
+    """The disjoint cases in which a joint action is applicable, each with the effects that fire."""
+    actions = [team.actions[number] for number in step]
+    chosen = {StepAtom(action.schema, action.args) for action in actions}
+    wanted = joined(And, [in_step(action.precondition, chosen) for action in actions])
+    effects = [
+        replace(effect, condition=in_step(effect.condition, chosen))
+        for action in actions
+        for effect in action.effects
+    ]
+    for known in _split({}, wanted, [effect.condition for effect in effects]):
+        yield known, [effect for effect in effects if _where(known, effect.condition) == TRUE]
+
+
+def _where(known: Known, formula: Formula) -> Formula:
+    """What is left of a formula where the values of some facts are known."""
 
     def value(leaf: GroundLeaf) -> Formula:
-        return Truth(leaf in chosen) if isinstance(leaf, StepAtom) else on_state(leaf)
+        return Truth(known[leaf]) if isinstance(leaf, Atom) and leaf in known else leaf
 
-    covered_by = [other for n in step for other in team.covered_by[n]]
-    wanted = [substituted(team.actions[n].precondition, value) for n in step]
-    wanted += [negated(substituted(team.actions[n].precondition, value)) for n in covered_by]
-    effects = [
-        (substituted(effect.condition, value), effect)
-        for n in step
-        for effect in team.actions[n].effects
-        if on_state(effect.atom) != FALSE
-    ]
-    for known in _split({}, wanted, [condition for condition, _ in effects]):
-        fired = [e for condition, e in effects if substituted(condition, _lookup(known)) == TRUE]
-        adds = {e.atom for e in fired if e.adds}
-        yield known, adds, {e.atom for e in fired if not e.adds} - adds
+    return substituted(formula, value)
 
 
-def _lookup(known: Known) -> Callable[[GroundLeaf], Formula]:
-    return lambda leaf: Truth(known[leaf]) if isinstance(leaf, Atom) and leaf in known else leaf
-
-
-def _split(
-    known: Known, formulas: Sequence[Formula], conditions: Sequence[Formula]
-) -> Iterator[dict[Atom, bool]]:
-    """Disjoint conjunctions of literals that say ``formulas`` and decide all ``conditions``."""
-    found = known_literals(joined(And, (substituted(f, _lookup(known)) for f in formulas)))
+def _split(known: Known, wanted: Formula, conditions: Sequence[Formula]) -> Iterator[Known]:
+    """Disjoint conjunctions of literals that say ``wanted`` and decide all ``conditions``."""
+    wanted = _where(known, wanted)
+    found = known_literals(wanted)
     if found is None:
         return
     new, rest = found
-    known = {**known, **new}
-    if new and rest:
-        yield from _split(known, rest, conditions)
+    if new:
+        yield from _split({**known, **new}, joined(And, rest), conditions)
         return
-    open_formulas = rest or [
-        c for c in (substituted(c, _lookup(known)) for c in conditions) if not isinstance(c, Truth)
-    ]
-    if not open_formulas:
-        yield dict(known)
+    decided = (_where(known, condition) for condition in conditions)
+    undecided = rest or [part for part in decided if not isinstance(part, Truth)]
+    if not undecided:
+        yield known
         return
-    *_, atom = (leaf for leaf, _ in literals(open_formulas[0]) if isinstance(leaf, Atom))
+    atom, _ = literals(undecided[0])[-1]
+    assert isinstance(atom, Atom), "a subaction or an equality in a formula about the state"
     for value in (True, False):
-        yield from _split({**known, atom: value}, rest, conditions)
+        yield from _split({**known, atom: value}, wanted, conditions)

@@ -7,25 +7,18 @@ What no other robot can see is applied as it is selected (`StagedAction`).
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from itertools import pairwise
 
 from planners.classical.selectors import Selectors
 from planners.classical.task import Known, Labels
-from planners.classical.writer import (
-    Writer,
-    goal_formula,
-    known_literals,
-    own_fact,
-    state_reader,
-)
-from planners.joint.model import Goal, JointModel
+from planners.classical.writer import Writer, known_literals, own_fact
+from planners.joint.model import JointModel
 from planners.pddl.formula_tree import (
     GroundLeaf,
     conjuncts,
     joined,
     literals,
-    negated,
     signed,
     substituted,
 )
@@ -45,7 +38,8 @@ class StagedAction:
     ``selected`` is the fact that its first owner, ``robot``, has selected it; ``literals`` what
     that requires of the state (None if it contradicts itself), ``checks`` what is checked when all
     have selected: the other conjuncts of its precondition.  ``adds`` and ``deletes`` are its
-    unconditional effects, ``groups`` the others, by condition: (condition, (adds, deletes)).
+    unconditional effects, ``groups`` the others, by condition: (condition, (adds, deletes));
+    ``may_add`` and ``may_delete`` are of both.
     """
 
     #: The atoms that it may delete in a step in which it, or another action, may add them: their
@@ -60,17 +54,21 @@ class StagedAction:
     def __init__(
         self, team: Selectors, number: int, value: Callable[[GroundLeaf], Formula]
     ) -> None:
-        action = team.actions[number]
-        self.number, self.label, self.robot = number, action.label, team.owners[number][0]
+        action, (self.robot, *self.others) = team.actions[number], team.owners[number]
+        self.number, self.label, self.clashes = number, action.label, team.clashes[number]
+        #: In joint-action PDDL, where one team selects, what all robots do.
+        self.labels: Labels = tuple(enumerate(action.parts)) or ((self.robot, action.label),)
         self.selected = selected(team, self.robot, self.label)
         self._split_precondition(team, value)
         by_condition: dict[Formula, tuple[set[Atom], set[Atom]]] = {TRUE: (set(), set())}
         for effect in action.effects:
-            if value(effect.atom) != FALSE:
-                condition = substituted(effect.condition, value)
-                adds, deletes = by_condition.setdefault(condition, (set(), set()))
-                (adds if effect.adds else deletes).add(effect.atom)
+            condition = substituted(effect.condition, value)
+            adds, deletes = by_condition.setdefault(condition, (set(), set()))
+            (adds if effect.adds else deletes).add(effect.atom)
         by_condition.pop(FALSE, None)
+        self.may_add, self.may_delete = (
+            set[Atom]().union(*of) for of in zip(*by_condition.values(), strict=True)
+        )
         self.adds, self.deletes = by_condition.pop(TRUE)
         self.groups = list(by_condition.items())
 
@@ -83,18 +81,27 @@ class StagedAction:
                 continue  # among the clashes
             when = later if isinstance(part, And | Or | StepAtom) else now
             when.append(substituted(part, value))
-        later += [
-            negated(substituted(team.actions[other].precondition, value))
-            for other in team.covered_by[self.number]
-        ]
         found = known_literals(joined(And, now))
         self.literals = None if found is None else found[0]
         self.checks = joined(And, later)
 
-    def has(self, stage: str) -> bool:
-        """Whether there is something to do in a stage, one of `STAGES`."""
-        checks = self.checks != TRUE or bool(self.groups)
-        return {"check": checks, "undo": bool(self.early), "apply": True}[stage]
+    @property
+    def stages(self) -> list[str]:
+        """Those of `STAGES` in which something of it is left to do."""
+        if self.at_once:
+            return []
+        checks = ["check"] if self.checks != TRUE or self.groups else []
+        return [*checks, *(["undo"] if self.early else []), "apply"]
+
+    @property
+    def unselected(self) -> tuple[Atom, bool]:
+        """What says that it is not selected, to those whom it rules out."""
+        return (self.selected, False) if self.mark is None else (self.mark, True)
+
+    def may_meet(self, other: StagedAction) -> bool:
+        """Whether both may be selected in one step."""
+        clash = other.robot == self.robot or other.number in self.clashes
+        return other is self or not clash
 
     def fires(self, group: int) -> Atom:
         """The fact that the condition of a group of effects holds."""
@@ -110,32 +117,31 @@ def staged_actions(
     in the step makes true; and what an action may add itself counts as added.
     """
     actions = tuple(StagedAction(team, number, value) for number in range(len(team.actions)))
-    adders: dict[Atom, set[int]] = defaultdict(set)
-    for action in actions:
-        for atom in action.adds.union(*(adds for _, (adds, _) in action.groups)):
-            adders[atom].add(action.number)
-    for action in actions:
-        may_delete = action.deletes.union(*(deletes for _, (_, deletes) in action.groups))
-        action.early = frozenset(
-            atom
-            for atom in may_delete - action.adds
-            if any(
-                other == action.number or actions[other].robot != action.robot
-                for other in adders[atom] - team.clashes[action.number]
-            )
-        )
+    _find_early(actions)
     reads_late, needs = _readers(actions)
     marks: dict[tuple[int, frozenset[int]], Atom] = {}
     for action in actions:
-        action.at_once = _may_be_at_once(team, action, reads_late, needs)
-        clashes = team.clashes[action.number]
-        later = frozenset(n for n in clashes if team.owners[n][0] > action.robot)
+        action.at_once = _may_be_at_once(action, reads_late, needs)
+        later = frozenset(n for n in action.clashes if actions[n].robot > action.robot)
         if action.at_once and later:
             name = team.names[action.robot], str(len(marks))
             action.mark = marks.setdefault(
                 (action.robot, later), own_fact("rules nothing out", *name)
             )
     return actions
+
+
+def _find_early(actions: Sequence[StagedAction]) -> None:
+    adders: dict[Atom, list[StagedAction]] = defaultdict(list)
+    for action in actions:
+        for atom in action.may_add:
+            adders[atom].append(action)
+    for action in actions:
+        action.early = frozenset(
+            atom
+            for atom in action.may_delete - action.adds
+            if any(map(action.may_meet, adders[atom]))
+        )
 
 
 def selected(team: Selectors, robot: int, label: str) -> Atom:
@@ -146,21 +152,18 @@ def selected(team: Selectors, robot: int, label: str) -> Atom:
 _Readers = Mapping[object, Set[StagedAction]]
 
 
-def _may_be_at_once(
-    team: Selectors, action: StagedAction, reads_late: _Readers, needs: _Readers
-) -> bool:
+def _may_be_at_once(action: StagedAction, reads_late: _Readers, needs: _Readers) -> bool:
     """Whether an action can be applied as it is selected.
 
     Not if several robots own it, if something of it is checked or undone, if a formula that is
     checked names it, or if an action beside it reads what it has written.
     """
-    if len(team.owners[action.number]) > 1 or action.has("check") or action.has("undo"):
+    if action.others or action.stages != ["apply"] or action.selected in reads_late:
         return False
     written = action.adds | action.deletes
-    readers = {r for atom in written for r in reads_late.get(atom, ()) if r.robot != action.robot}
+    readers = {r for atom in written for r in reads_late.get(atom, ())}
     readers |= {r for atom in written for r in needs.get(atom, ()) if r.robot > action.robot}
-    clashes = team.clashes[action.number]
-    return action.selected not in reads_late and all(r.number in clashes for r in readers)
+    return not any(map(action.may_meet, readers))
 
 
 def _readers(actions: Sequence[StagedAction]) -> tuple[_Readers, _Readers]:
@@ -190,12 +193,11 @@ _LEFT = own_fact("something left to do")
 _MANY = 20_000
 
 
-def select_then_apply(team: Selectors, model: JointModel, goal: Goal, step_cost: int) -> Writer:
+def select_then_apply(team: Selectors, model: JointModel, goal: Formula, step_cost: int) -> Writer:
     """Stages of a step: all select; all check; all undo (rarely); all apply.
 
     Robots without work skip a stage, and a step without work left ends when all have selected.
     """
-    on_state = state_reader(model)
     who = {
         StepAtom(action.schema, action.args): selected(team, owners[0], action.label)
         for action, owners in zip(team.actions, team.owners, strict=True)
@@ -203,12 +205,12 @@ def select_then_apply(team: Selectors, model: JointModel, goal: Goal, step_cost:
 
     def value(leaf: GroundLeaf) -> Formula:
         """On the classical facts: a subaction is done if its first owner has selected it."""
-        return who.get(leaf, FALSE) if isinstance(leaf, StepAtom) else on_state(leaf)
+        return who.get(leaf, FALSE) if isinstance(leaf, StepAtom) else leaf
 
     form = _SelectThenApply(Writer(model.codec.facts), team, staged_actions(team, value), step_cost)
     for robot in range(len(team.names)):
         form.write_robot(robot)
-    form.write_goal(goal_formula(model, goal))
+    form.write_goal(goal)
     return form.out
 
 
@@ -220,34 +222,30 @@ class _SelectThenApply:
     """
 
     def __init__(
-        self,
-        out: Writer,
-        team: Selectors,
-        actions: Sequence[StagedAction],
-        step_cost: int,
+        self, out: Writer, team: Selectors, actions: Sequence[StagedAction], step_cost: int
     ) -> None:
-        self.out = out
-        self._team = team
-        self._all = actions
+        self.out, self._team, self._all, self._step_cost = out, team, actions, step_cost
         self._actions = [action for action in actions if action.literals is not None]
-        self._step_cost = step_cost
-        self._parts = {_IDLE: (), **{action.label: action.parts for action in team.actions}}
         #: The facts that it is a robot's turn to select; with the first a step begins.
         self._choosing = [own_fact("time to choose", name) for name in team.names]
         self._first = self._choosing[0]
-        late = [action for action in self._actions if not action.at_once]
-        busy = {(STAGES.index(s), a.robot) for a in late for s in STAGES if a.has(s)}
-        order = [(STAGES[number], robot) for number, robot in sorted(busy)]
+        #: Robots that select a shared action first, with those who may have to join.
+        self._calls = sorted({(own[0], other) for own in team.owners for other in own[1:]})
+        busy = {(stage, action.robot) for action in self._actions for stage in action.stages}
+        order = sorted(busy, key=lambda one: (STAGES.index(one[0]), one[1]))
         facts = [own_fact(f"time to {stage}", team.names[robot]) for stage, robot in order]
         self._stages = dict(zip(order, pairwise((*facts, self._first)), strict=True))
         #: What comes when all have selected, and something is left to do.
         self._first_work = (*facts, self._first)[0]
         #: Whether a robot before the last one may leave something to do.
-        self._leaves = any(action.robot + 1 < len(team.names) for action in late)
+        self._leaves = any(robot + 1 < len(team.names) for _, robot in order)
+        self._prepare_end()
+
+    def _prepare_end(self) -> None:
+        marks = {action.mark for action in self._all if action.mark is not None}
         #: What is true between two steps, false once something is selected, and restored.
-        marks = {action.mark for action in actions if action.mark is not None}
-        self._restored = marks | {self._none_left(*one) for one in order}
-        last = sum(action.robot == len(team.names) - 1 for action in actions)
+        self._restored = marks | {self._none_left(*one) for one in self._stages}
+        last = sum(action.robot == len(self._team.names) - 1 for action in self._all)
         self._tidies = last * len(marks) > _MANY
         if self._tidies:
             self.out.action("end the step", {_TIDY: True}, {self._first} | self._restored, {_TIDY})
@@ -255,56 +253,54 @@ class _SelectThenApply:
     def write_robot(self, robot: int) -> None:
         """Everything that one robot does in a step."""
         if (idling := self._team.idling[robot]) is not None:
-            self._choose(robot, _IDLE, robot, {}, cost=idling)
+            self._choose(robot, _IDLE, robot, {}, cost=idling, labels=((robot, None),))
         for action in self._actions:
             if robot == action.robot:
                 self._select(action)
-            elif robot in self._team.owners[action.number]:  # it joins what the first one selected
-                known = {action.selected: True, _LEFT: True}
+            elif robot in action.others:  # it joins what the first one selected
+                known, labels = {action.selected: True, _LEFT: True}, ((robot, action.label),)
                 waits = {self._waits(action.robot, robot)}
-                self._choose(robot, action.label, action.robot, known, deletes=waits)
+                self._choose(robot, action.label, action.robot, known, deletes=waits, labels=labels)
         for (stage, own), (here, after) in self._stages.items():
             if own == robot:
                 name = f"nothing to {stage} {self._team.names[robot]}"
                 self._lead(name, {self._none_left(stage, robot): True}, here, after)
         for action in self._actions:
-            if robot == action.robot and not action.at_once:
+            if robot == action.robot:
                 self._carry_out(action)
 
     def write_goal(self, formula: Formula) -> None:
         """The goal counts between two steps."""
         self.out.between = self.out.fact(self._first)
         self.out.init = {self.out.between, *map(self.out.fact, sorted(self._restored, key=str))}
-        found = known_literals(formula)
-        if found and not found[1]:
-            self.out.goal = self.out.conditions({self._first: True, **found[0]})
-            return
-        done = own_fact("goal reached")
-        self.out.goal = self.out.conditions({done: True})
-        self.out.route("reach the goal", formula, self._first, done, {})
+        done = self.out.end(formula, {self._first: True})
+        if done is not None:
+            self.out.route("reach the goal", formula, self._first, done, {})
 
     # -- select
 
     def _select(self, action: StagedAction) -> None:
         """The first owner selects an action; what earlier robots have selected may forbid it."""
         assert action.literals is not None, "an action that can never be selected"
-        team, robot = self._team, action.robot
+        robot = action.robot
         # No earlier robot has selected what cannot share a step with it.
-        clashing = [self._all[number] for number in team.clashes[action.number]]
+        clashing = [self._all[number] for number in action.clashes]
         earlier = [other for other in clashing if other.robot < robot]
-        known = action.literals | {o.selected: False for o in earlier if not o.at_once}
-        known |= {other.mark: True for other in earlier if other.mark is not None}
+        known = action.literals | dict(other.unselected for other in earlier)
         if action.at_once:
             adds, deletes = action.adds, action.deletes
-            over = set() if action.mark is None else {action.mark}
         else:
-            adds = {self._waits(robot, k) for k in team.owners[action.number] if k != robot}
-            adds, deletes = adds | {action.selected}, set()
-            over = {self._none_left(stage, robot) for stage in STAGES if action.has(stage)}
+            adds = {action.selected, *(self._waits(robot, other) for other in action.others)}
+            deletes = set()
+        over = {self._none_left(stage, robot) for stage in action.stages}
+        if action.mark is not None:
+            over = {action.mark}
         # What is over was true: to say so spares readers a conditional effect.
         known |= dict.fromkeys(over, True)
-        cost, late = team.seconds[action.number], not action.at_once
-        self._choose(robot, action.label, robot, known, adds, deletes | over, cost, late=late)
+        cost, late = self._team.seconds[action.number], not action.at_once
+        self._choose(
+            robot, action.label, robot, known, adds, deletes | over, cost, action.labels, late=late
+        )
 
     def _choose(
         self,
@@ -315,6 +311,7 @@ class _SelectThenApply:
         adds: Set[Atom] = frozenset(),
         deletes: Set[Atom] = frozenset(),
         cost: int = 0,
+        labels: Labels = (),
         *,
         late: bool = False,
     ) -> None:
@@ -323,26 +320,27 @@ class _SelectThenApply:
         ``first`` is the first owner of what is selected: robots that wait for another selection of
         this one forbid it.  ``late``: something of it is left for later stages.
         """
-        callers = sorted({own[0] for own in self._team.owners if robot in own} - {robot})
+        callers = [caller for caller, called in self._calls if called == robot]
         waiting = {self._waits(caller, robot): caller == first for caller in callers}
         name, known = f"choose {self._team.names[robot]} {label}", {**known, **waiting}
-        whole = tuple(enumerate(self._parts[label]))  # in joint-action PDDL, where one team selects
-        labels = whole or ((robot, None if label == _IDLE else label),)
         cost += self._step_cost if robot == 0 else 0
         here, following = self._choosing[robot], self._choosing[robot + 1 :]
         if following:
             adds |= {_LEFT} if late else set()
             self._lead(name, known, here, following[0], adds, deletes, cost, labels)
             return
+        for left, own in self._left_before(known):
+            after = self._first_work if left or late else self._first
+            self._lead(name, own, here, after, adds, deletes | left, cost, labels)
+
+    def _left_before(self, known: Known) -> Iterator[tuple[Set[Atom], Known]]:
+        """What is known when all have selected, with `_LEFT` where something is left to do."""
         if not self._leaves:
-            after = self._first_work if late else self._first
-            self._lead(name, known, here, after, adds, deletes, cost, labels)
+            yield set(), known
             return
         for left in (False, True):
             if known.get(_LEFT, left) == left:
-                own, over = {**known, _LEFT: left}, {_LEFT} if left else set()
-                after = self._first_work if left or late else self._first
-                self._lead(name, own, here, after, adds, deletes | over, cost, labels)
+                yield {_LEFT} if left else set(), {**known, _LEFT: left}
 
     def _waits(self, caller: int, robot: int) -> Atom:
         """The caller has selected an action that this robot has to select too."""
@@ -378,11 +376,12 @@ class _SelectThenApply:
 
     def _carry_out(self, action: StagedAction) -> None:
         """Check, undo and apply a selected action; of a shared one the first owner does all."""
-        if action.has("check"):
-            self._check(action, *self._stages["check", action.robot])
-        if action.has("undo"):
-            self._perform(action, *self._stages["undo", action.robot], early=True)
-        self._perform(action, *self._stages["apply", action.robot], early=False)
+        for stage in action.stages:
+            here, after = self._stages[stage, action.robot]
+            if stage == "check":
+                self._check(action, here, after)
+            else:
+                self._perform(action, here, after, early=stage == "undo")
 
     def _check(self, action: StagedAction, here: Atom, after: Atom) -> None:
         """Meet the formulas of an action and note which of its conditional effects fire."""

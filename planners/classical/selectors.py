@@ -4,14 +4,22 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from itertools import permutations, product
+from itertools import product
 
+from planners.classical.writer import state_reader
 from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel
-from planners.pddl.formula_tree import GroundLeaf, forbidden_steps, literals, substituted
-from planners.pddl.lifted import FALSE, Atom, Equal, Formula, StepAtom, Truth
+from planners.pddl.formula_tree import (
+    GroundLeaf,
+    forbidden_steps,
+    joined,
+    literals,
+    negated,
+    substituted,
+)
+from planners.pddl.lifted import FALSE, And, Atom, Equal, Formula, StepAtom, Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,10 +27,8 @@ class Selectors:
     """Who selects what: each robot its subactions; in joint-action PDDL the team, joint actions.
 
     ``idling`` is the second cost of idling for each of them, None for a team that always acts;
-    ``owners``, ``seconds`` (second costs) and ``clashes`` (those of others that cannot share a step
-    with it) are by action.  ``covered_by``: in joint-action PDDL, the cheaper (or earlier) actions
-    with the same parts.  Where one of them is applicable too, both are one joint action, and it
-    stands for both.
+    ``actions`` are over facts of the model; ``owners``, ``seconds`` (second costs) and ``clashes``
+    (those of others that cannot share a step with it) are by action.
     """
 
     names: tuple[str, ...]
@@ -31,7 +37,6 @@ class Selectors:
     owners: tuple[tuple[int, ...], ...]
     seconds: tuple[int, ...]
     clashes: tuple[frozenset[int], ...]
-    covered_by: tuple[tuple[int, ...], ...]
 
     def second_cost(self, step: Sequence[int]) -> int:
         """The second cost of a joint step: of its actions, and of those who idle in it."""
@@ -50,27 +55,45 @@ class Selectors:
 
 def selectors_of(model: JointModel) -> Selectors:
     """Who selects what in a joint model, at what second cost."""
-    actions, number = model.actions, len(model.actions)
+    actions = tuple(_on_facts(action, model) for action in model.actions)
     seconds = tuple(action.second_cost(model.cost) for action in actions)
     if model.is_joint_action:
-        owners, nothing = ((0,),) * number, (frozenset[int](),) * number
-        covered = _covered_by(actions, seconds)
-        return Selectors(("team",), (None,), actions, owners, seconds, nothing, covered)
+        owners, nothing = ((0,),) * len(actions), (frozenset[int](),) * len(actions)
+        alone = _one_of_each(actions, seconds)
+        return Selectors(("team",), (None,), alone, owners, seconds, nothing)
     by = tuple(action.owners for action in actions)
-    idling = tuple(model.idling_costs)
-    return Selectors(model.robots, idling, actions, by, seconds, clashes(actions), ((),) * number)
+    idling, apart = tuple(model.idling_costs), clashes(model.actions)
+    return Selectors(model.robots, idling, actions, by, seconds, apart)
 
 
-def _covered_by(
+def _on_facts(action: GroundAction, model: JointModel) -> GroundAction:
+    """An action whose formulas and effects are over facts of the model only."""
+    reader, facts = state_reader(model), model.codec.facts
+    effects = [
+        replace(effect, condition=substituted(effect.condition, reader))
+        for effect in action.effects
+        if effect.atom in facts
+    ]
+    precondition = substituted(action.precondition, reader)
+    return replace(action, precondition=precondition, effects=tuple(effects))
+
+
+def _one_of_each(
     actions: Sequence[GroundAction], seconds: Sequence[int]
-) -> tuple[tuple[int, ...], ...]:
-    groups: dict[tuple[str | None, ...], list[int]] = defaultdict(list)
+) -> tuple[GroundAction, ...]:
+    """Joint actions that are not done where a cheaper (or earlier) one has the same parts.
+
+    Where both are applicable they are one joint action, and the cheaper one stands for both.
+    """
+    alone = [*actions]
+    before: dict[tuple[str | None, ...], list[Formula]] = defaultdict(list)
     for number in sorted(range(len(actions)), key=lambda n: (seconds[n], n)):
-        groups[actions[number].parts].append(number)
-    return tuple(
-        tuple(groups[action.parts][: groups[action.parts].index(n)])
-        for n, action in enumerate(actions)
-    )
+        action = actions[number]
+        others = before[action.parts]
+        precondition = joined(And, (action.precondition, *map(negated, others)))
+        alone[number] = replace(action, precondition=precondition)
+        others.append(action.precondition)
+    return tuple(alone)
 
 
 #: A fact and the value that is written or read.
@@ -86,41 +109,52 @@ def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
     Besides, a formula may forbid the other.  Effects that cannot happen with just the two in the
     step neither write nor read.
     """
-    number = {StepAtom(a.schema, a.args): n for n, a in enumerate(actions)}
-
-    def naming(named: Callable[[GroundAction], Set[object]]) -> _Pairs:
-        return {
-            frozenset((n, number[step]))
-            for n, action in enumerate(actions)
-            for step in number.keys() & named(action)
-        }
-
-    linked = naming(lambda a: a.links | {leaf for leaf, positive in _conditions(a) if positive})
+    linked = _naming(actions, _partners)
     # The condition of an effect of one names the other: what can happen depends on both.
-    special = naming(lambda a: {leaf for e in a.effects for leaf, _ in literals(e.condition)})
-    pairs = _contrary([_with_effects(action) for action in actions], linked) - special
-    both = frozenset((0, 1))
+    special = _naming(actions, _in_effects)
+    alone = {number: _with_effects(action) for number, action in enumerate(actions)}
+    pairs = _contrary(alone, linked) - special
     for pair in special:
-        two = [actions[n] for n in sorted(pair)]
-        alone = [_with_effects(action, *two) for action in two]
-        if both in _contrary(alone, {both} if pair in linked else set()):
-            pairs.add(pair)
-    pairs |= naming(lambda a: set(forbidden_steps(a.precondition)))
+        two = [actions[number] for number in pair]
+        pairs |= _contrary({n: _with_effects(actions[n], *two) for n in pair}, linked)
+    pairs |= _naming(actions, lambda a: forbidden_steps(a.precondition))
     found: list[set[int]] = [set() for _ in actions]
     for pair in pairs:
-        for one, other in permutations(pair, 2):
-            found[one].add(other)
-    return tuple(frozenset(others) for others in found)
+        for number in pair:
+            found[number] |= pair - {number}
+    return tuple(map(frozenset, found))
 
 
-def _contrary(actions: Sequence[GroundAction], linked: _Pairs) -> _Pairs:
+def _naming(
+    actions: Sequence[GroundAction], named: Callable[[GroundAction], Iterable[object]]
+) -> _Pairs:
+    """Pairs of which one names the other."""
+    number = {StepAtom(a.schema, a.args): n for n, a in enumerate(actions)}
+    return {
+        frozenset((n, number[step]))
+        for n, action in enumerate(actions)
+        for step in number.keys() & named(action)
+    }
+
+
+def _partners(action: GroundAction) -> Set[object]:
+    """What links name, and positive literals."""
+    return action.links | {leaf for leaf, positive in _conditions(action) if positive}
+
+
+def _in_effects(action: GroundAction) -> Set[object]:
+    """What the conditions of its effects name."""
+    return {leaf for effect in action.effects for leaf, _ in literals(effect.condition)}
+
+
+def _contrary(actions: Mapping[int, GroundAction], linked: _Pairs) -> _Pairs:
     """Pairs of which one writes the contrary of what the other writes, or reads unless linked.
 
-    An action that makes an atom true and false makes it true.
+    ``actions`` are by number.  An action that makes an atom true and false makes it true.
     """
     writers: dict[_Literal, set[int]] = defaultdict(set)
     readers: dict[_Literal, set[int]] = defaultdict(set)
-    for number, action in enumerate(actions):
+    for number, action in actions.items():
         adds = {effect.atom for effect in action.effects if effect.adds}
         for effect in action.effects:
             if effect.adds or effect.atom not in adds:
@@ -139,12 +173,17 @@ def _contrary(actions: Sequence[GroundAction], linked: _Pairs) -> _Pairs:
 def _with_effects(action: GroundAction, *step: GroundAction) -> GroundAction:
     """The action with those effects only that may happen with these, and itself, in the step."""
     there = {StepAtom(a.schema, a.args) for a in (action, *step)}
+    kept = tuple(e for e in action.effects if in_step(e.condition, there) != FALSE)
+    return replace(action, effects=kept)
+
+
+def in_step(formula: Formula, step: Collection[StepAtom]) -> Formula:
+    """What a formula says of the state where exactly these actions are done in the step."""
 
     def value(leaf: GroundLeaf) -> Formula:
-        return Truth(leaf in there) if isinstance(leaf, StepAtom) else leaf
+        return Truth(leaf in step) if isinstance(leaf, StepAtom) else leaf
 
-    kept = tuple(e for e in action.effects if substituted(e.condition, value) != FALSE)
-    return replace(action, effects=kept)
+    return substituted(formula, value)
 
 
 def _conditions(action: GroundAction) -> Iterator[tuple[Atom | StepAtom, bool]]:

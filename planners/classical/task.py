@@ -104,33 +104,34 @@ def with_positive_literals(task: ClassicalTask, *, only_goal: bool) -> Classical
     Each fact that is wanted false has a partner, which is true exactly where the fact is false.
     Every action keeps the two apart, so plans stay the same, one for one.
     """
-    conditions = [*task.goal]
-    for action in () if only_goal else task.actions:
-        conditions += action.preconditions
-    wanted = sorted({fact for fact, positive in conditions if not positive})
+    read = () if only_goal else (action.preconditions for action in task.actions)
+    wanted = sorted({fact for own in (task.goal, *read) for fact, positive in own if not positive})
     partner = {fact: len(task.facts) + number for number, fact in enumerate(wanted)}
 
-    def positive(conditions: Iterable[Condition]) -> tuple[Condition, ...]:
-        return tuple((fact if value else partner[fact], True) for fact, value in conditions)
-
-    def others(facts: Iterable[int]) -> tuple[int, ...]:
-        return tuple(partner[fact] for fact in facts if fact in partner)
+    def with_partners(action: ClassicalAction) -> ClassicalAction:
+        conditions = action.preconditions
+        return replace(
+            action,
+            preconditions=conditions if only_goal else _positive(conditions, partner),
+            adds=(*action.adds, *_partners(action.deletes, partner)),
+            deletes=(*action.deletes, *_partners(action.adds, partner)),
+        )
 
     return replace(
         task,
         facts=(*task.facts, *(f"(not {task.facts[fact]})" for fact in wanted)),
-        init=task.init | {new for fact, new in partner.items() if fact not in task.init},
-        actions=tuple(
-            replace(
-                action,
-                preconditions=action.preconditions if only_goal else positive(action.preconditions),
-                adds=(*action.adds, *others(action.deletes)),
-                deletes=(*action.deletes, *others(action.adds)),
-            )
-            for action in task.actions
-        ),
-        goal=positive(task.goal),
+        init=task.init.union(_partners(partner.keys() - task.init, partner)),
+        actions=tuple(map(with_partners, task.actions)),
+        goal=_positive(task.goal, partner),
     )
+
+
+def _positive(conditions: Iterable[Condition], partner: Mapping[int, int]) -> tuple[Condition, ...]:
+    return tuple((fact if value else partner[fact], True) for fact, value in conditions)
+
+
+def _partners(facts: Iterable[int], partner: Mapping[int, int]) -> list[int]:
+    return [partner[fact] for fact in facts if fact in partner]
 
 
 def to_pddl(classical: ClassicalTask, *, costs: bool = True) -> tuple[str, str]:
@@ -150,16 +151,14 @@ def to_pddl(classical: ClassicalTask, *, costs: bool = True) -> tuple[str, str]:
         *(["  (:functions (total-cost) - number)"] if costs else []),
     ]
     for safe, action in zip(actions, classical.actions, strict=True):
-        changes = [f"({facts[n]})" for n in action.adds] + [
-            f"(not ({facts[n]}))" for n in action.deletes
-        ]
+        changes = [*((n, True) for n in action.adds), *((n, False) for n in action.deletes)]
         paid = [f"(increase (total-cost) {action.cost})"] if costs else []
         domain += [
             f"  ; {action.name}",
             f"  (:action {safe}",
             "    :parameters ()",
             f"    :precondition {_all_of(facts, action.preconditions)}",
-            f"    :effect (and {' '.join((*changes, *paid))}))",
+            f"    :effect {_all_of(facts, changes, paid)})",
         ]
     problem = [
         "(define (problem plain-task)",
@@ -168,10 +167,10 @@ def to_pddl(classical: ClassicalTask, *, costs: bool = True) -> tuple[str, str]:
         *(["    (= (total-cost) 0)"] if costs else []),
         *(f"    ({facts[n]})" for n in sorted(classical.init)),
         "  )",
-        f"  (:goal {_all_of(facts, classical.goal)}){'' if costs else ')'}",
-        *(["  (:metric minimize (total-cost)))"] if costs else []),
+        f"  (:goal {_all_of(facts, classical.goal)})",
+        *(["  (:metric minimize (total-cost))"] if costs else []),
     ]
-    return "\n".join((*domain, ")", "")), "\n".join((*problem, ""))
+    return "\n".join((*domain, ")", "")), "\n".join(problem) + ")\n"
 
 
 def _requirements(classical: ClassicalTask, costs: bool) -> str:
@@ -187,9 +186,9 @@ def action_names(classical: ClassicalTask) -> list[str]:
     return _safe_names(action.name for action in classical.actions)
 
 
-def _all_of(names: Sequence[str], conditions: Iterable[Condition]) -> str:
+def _all_of(names: Sequence[str], conditions: Iterable[Condition], more: Sequence[str] = ()) -> str:
     parts = [f"({names[n]})" if positive else f"(not ({names[n]}))" for n, positive in conditions]
-    return f"(and{''.join(f' {part}' for part in parts)})"
+    return f"(and{''.join(f' {part}' for part in (*parts, *more))})"
 
 
 def _safe_names(texts: Iterable[str]) -> list[str]:

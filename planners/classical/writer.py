@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 
 from planners.classical.task import ClassicalAction, Condition, Known, Labels
@@ -11,19 +12,23 @@ from planners.pddl.formula_tree import GroundLeaf, conjuncts, negated, signed, s
 from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, Not
 
 
+class TooManyError(Exception):
+    """A form is larger than its limit."""
+
+
 class Writer:
-    """Collects facts and actions; equal actions are written once.
+    """Collects facts and actions, up to ``most``; equal actions are written once.
 
     The facts of a model come first, with the numbers that they have there.
     """
 
-    def __init__(self, facts: Iterable[Atom]) -> None:
+    def __init__(self, facts: Iterable[Atom], most: float = math.inf) -> None:
+        self._most = most
         self.facts: dict[Atom, int] = {atom: n for n, atom in enumerate(facts)}
-        self.actions: list[ClassicalAction] = []
+        self.actions: dict[ClassicalAction, None] = {}
         self.init: set[int] = set()
         self.between: int | None = None
         self.goal: tuple[Condition, ...] = ()
-        self._seen: set[ClassicalAction] = set()
         self._phases = 0
 
     def fact(self, atom: Atom) -> int:
@@ -44,13 +49,26 @@ class Writer:
         labels: Labels = (),
     ) -> None:
         """An action; an atom that it both adds and deletes is added."""
-        plus = {self.fact(atom) for atom in _ordered(adds)}
-        minus = {self.fact(atom) for atom in _ordered(deletes)} - plus
-        changes = tuple(sorted(plus)), tuple(sorted(minus))
-        new = ClassicalAction(name, self.conditions(known), *changes, cost, labels)
-        if new not in self._seen:
-            self._seen.add(new)
-            self.actions.append(new)
+        plus, minus = ({self.fact(atom) for atom in _ordered(own)} for own in (adds, deletes))
+        changes = tuple(sorted(plus)), tuple(sorted(minus - plus))
+        self.actions.setdefault(
+            ClassicalAction(name, self.conditions(known), *changes, cost, labels)
+        )
+        if len(self.actions) > self._most:
+            raise TooManyError
+
+    def end(self, wanted: Formula, known: Known) -> Atom | None:
+        """Let the goal be what is ``known`` and literals; else a fact to be made true, which it is.
+
+        ``wanted`` is what the plans of the model end with.
+        """
+        found = known_literals(wanted)
+        if found and not found[1]:
+            self.goal = self.conditions({**known, **found[0]})
+            return None
+        done = own_fact("goal reached")
+        self.goal = self.conditions({done: True})
+        return done
 
     def phase(self) -> Atom:
         """A new fact that says where between two joint states the computation is."""
@@ -73,24 +91,33 @@ class Writer:
         are evaluated from left to right, as in a programming language, so that there is one way in
         every state, and the size is linear.
         """
-        is_conjunction = isinstance(formula, And) and otherwise is None
-        if isinstance(formula, Junction) and formula.parts and not is_conjunction:
-            here = start
-            for left, part in zip(
-                range(len(formula.parts) - 1, -1, -1), formula.parts, strict=True
-            ):
-                after = self.phase() if left else None
-                if isinstance(formula, And):
-                    self.route(
-                        name, part, here, after or end, known, () if left else gain, otherwise
-                    )
-                else:
-                    self.route(name, part, here, end, known, gain, after or otherwise)
-                here = after or here
+        if not isinstance(formula, Junction) or (isinstance(formula, And) and otherwise is None):
+            self._conjunction(name, formula, start, end, known, gain)
+            if otherwise is not None:
+                self._conjunction(name, negated(formula), start, otherwise, known)
             return
-        self._conjunction(name, formula, start, end, known, gain)
-        if otherwise is not None:
-            self._conjunction(name, negated(formula), start, otherwise, known)
+        self._in_turn(name, formula, start, end, known, gain, otherwise)
+
+    def _in_turn(
+        self,
+        name: str,
+        formula: Junction,
+        start: Atom,
+        end: Atom,
+        known: Known,
+        gain: tuple[Atom, ...],
+        otherwise: Atom | None = None,
+    ) -> None:
+        """A route by one part after another; the last one decides."""
+        *first, last = formula.parts
+        for part in first:
+            after = self.phase()
+            if isinstance(formula, And):
+                self.route(name, part, start, after, known, otherwise=otherwise)
+            else:
+                self.route(name, part, start, end, known, gain, after)
+            start = after
+        self.route(name, last, start, end, known, gain, otherwise)
 
     def _conjunction(
         self,
@@ -108,16 +135,15 @@ class Writer:
         ):
             return
         literals, forks = found
-        here = start
-        if literals or not forks:
-            here = self.phase() if forks else end
-            self.action(
-                name, {**known, **literals, start: True}, (here, *(() if forks else gain)), (start,)
-            )
-        for left, fork in zip(range(len(forks) - 1, -1, -1), forks, strict=True):
-            after = self.phase() if left else end
-            self.route(name, fork, here, after, known, () if left else gain)
-            here = after
+        met = {**known, **literals, start: True}
+        if not forks:
+            self.action(name, met, (end, *gain), (start,))
+            return
+        if literals:
+            here = self.phase()
+            self.action(name, met, (here,), (start,))
+            start = here
+        self._in_turn(name, And(tuple(forks)), start, end, known, gain)
 
 
 def known_literals(formula: Formula) -> tuple[dict[Atom, bool], list[Formula]] | None:
@@ -156,5 +182,5 @@ def goal_formula(model: JointModel, goal: Goal) -> Formula:
 
 def state_reader(model: JointModel) -> Callable[[GroundLeaf], Formula]:
     """How formulas read a state: an atom that no state has is false."""
-    facts = model.codec.facts.index
-    return lambda leaf: leaf if leaf in facts else FALSE
+    facts = model.codec.facts
+    return lambda leaf: FALSE if isinstance(leaf, Atom) and leaf not in facts else leaf
