@@ -64,6 +64,10 @@ class Touched:
     adds: frozenset[Atom]
     deletes: frozenset[Atom]
 
+    def needed(self, positive: bool) -> frozenset[Atom | StepAtom]:
+        """What it requires to be true, or to be false."""
+        return frozenset(atom for atom, value in self.needs if value == positive)
+
 
 class Rules:
     """The rules of joint steps for one problem and its team."""
@@ -91,6 +95,10 @@ class Rules:
             if isinstance(found, str):
                 return f"{robot}: {found}"
             chosen.append(found)
+        return self._composed(state, chosen)
+
+    def _composed(self, state: State, chosen: Sequence[Instance | None]) -> State | str:
+        """The state after the robots' own subactions, or the first rule that they break."""
         # A shared subaction stands for all its owners.
         together = {action.name: action for action in chosen if action}.values()
         acting = [action for action in together if not self.is_idling(action.schema)]
@@ -174,9 +182,9 @@ class Rules:
             return f"{one.text} deletes {_first(both)}, which {other.text} adds"
         if self._names(one, other) or self._names(other, one) or self._joined(one, other):
             return None  # linked: meant to be done together
-        if both := mine.deletes & {atom for atom, positive in theirs.needs if positive}:
+        if both := mine.deletes & theirs.needed(True):
             return f"{one.text} deletes {_first(both)}, which {other.text} requires"
-        if both := mine.adds & {atom for atom, positive in theirs.needs if not positive}:
+        if both := mine.adds & theirs.needed(False):
             return f"{one.text} adds {_first(both)}, which {other.text} requires to be false"
         return None
 
@@ -224,7 +232,7 @@ class Rules:
 
     def _names(self, one: Instance, other: Instance) -> bool:
         """Whether a positive literal of a condition of ``one`` is the subaction ``other``."""
-        return (other.name, True) in self.touched(one).needs
+        return other.name in self.touched(one).needed(True)
 
     def touched(self, action: Instance, other: Instance | None = None) -> Touched:
         """Conditional effects count as if they fired and their conditions as required.
@@ -296,12 +304,8 @@ class Rules:
         """The type-correct joint actions whose subaction comments read as these labels."""
         said = _words(None if label is None else _tokens(label) for label in labels)
         for schema in self.domain.schemas:
-            templates = {part.robot: part.template for part in schema.parts}
-            terms = _words(map(templates.get, self.team.robots))  # a missing line means idle
-            binding = {
-                term: name for term, name in zip(terms, said, strict=False) if term[0] == "?"
-            }
-            if [binding.get(term, term) for term in terms] != said:
+            binding = self._reading(schema, said)
+            if binding is None:
                 continue
             domains = [
                 tuple(o for o in self.meaning.objects(p.types) if binding.get(p.name, o) == o)
@@ -309,6 +313,13 @@ class Rules:
             ]
             for args in product(*domains):
                 yield self.bind(schema, args)
+
+    def _reading(self, schema: Schema, said: Sequence[str]) -> Binding | None:
+        """The parameters' values with which its subaction comments say these words, if any do."""
+        templates = {part.robot: part.template for part in schema.parts}
+        terms = _words(map(templates.get, self.team.robots))  # a missing line means idle
+        binding = {term: name for term, name in zip(terms, said, strict=False) if term[0] == "?"}
+        return binding if [binding.get(term, term) for term in terms] == said else None
 
 
 def _actions_in(formula: Formula) -> set[str]:

@@ -115,23 +115,29 @@ class ComposingStepper(Stepper):
         return next(self._broken_rules(row, labels), "this is a joint step")
 
     def _broken_rules(self, row: Rows, labels: Sequence[int]) -> Iterator[str]:
-        rows, here, together = row[None, :], np.zeros(1, np.int64), np.array([labels], np.int32)
-        chosen = [self.labelled[i][label] for i, label in enumerate(labels)]
-        acting = [(i, action) for i, action in enumerate(chosen) if action]
-        for i, action in acting:
+        acting = {i: action for i, own in enumerate(self.labelled) if (action := own[labels[i]])}
+        for action, robot, part in self._unmet(acting, row, labels, of_step=False):
+            yield f"{self._robots[robot]} cannot {action.label} here: it needs {_text(part)}"
+        for action in acting.values():
+            for owner in action.owners:
+                if acting.get(owner) != action:
+                    yield f"{action.label} needs {self._robots[owner]} to choose it too"
+        different = list(dict.fromkeys(acting.values()))
+        for number, second in enumerate(different):
+            yield from filter(None, (conflict(first, second) for first in different[:number]))
+        for action, *_ in self._unmet(acting, row, labels, of_step=True):
+            what = "needs another subaction in the same step, which is not chosen"
+            yield f"{action.label} {what}"
+
+    def _unmet(
+        self, acting: Mapping[int, GroundAction], row: Rows, labels: Sequence[int], *, of_step: bool
+    ) -> Iterator[tuple[GroundAction, int, Formula]]:
+        """The conjuncts of preconditions that do not hold: about the state, or about the step."""
+        beside = row[None, :], np.zeros(1, np.int64), np.array([labels], np.int32)
+        for robot, action in acting.items():
             for part in conjuncts(action.precondition):
-                if not speaks_of_step(part) and not self._evaluator.holds(part, rows, here)[0]:
-                    yield f"{self._robots[i]} cannot {action.label} here: it needs {_text(part)}"
-        for _, action in acting:
-            for owner in (own for own in action.owners if chosen[own] != action):
-                yield f"{action.label} needs {self._robots[owner]} to choose it too"
-        for (j, second), (i, first) in product(acting, repeat=2):
-            if i < j and not self.tables[i, j][labels[i], labels[j]]:
-                yield conflict(first, second) or f"{first.label} and {second.label} interfere"
-        for _, action in acting:
-            if not self._evaluator.holds(action.precondition, rows, here, together)[0]:
-                what = "needs another subaction in the same step, which is not chosen"
-                yield f"{action.label} {what}"
+                if speaks_of_step(part) == of_step and not self._evaluator.holds(part, *beside)[0]:
+                    yield action, robot, part
 
     def interfering_pairs(self) -> int:
         """See `Stepper`."""

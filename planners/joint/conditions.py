@@ -86,6 +86,24 @@ def split_condition(
     return known, rest
 
 
+def split_effects(
+    action: GroundAction, facts: FactTable
+) -> tuple[list[int], list[int], list[Effect]]:
+    """What an action adds and deletes in every state, by number, and its conditional effects.
+
+    Effects on facts that are never true are left out.
+    """
+    adds, deletes, conditional = list[int](), list[int](), list[Effect]()
+    for effect in action.effects:
+        if effect.atom not in facts:
+            continue
+        if effect.condition != TRUE:
+            conditional.append(effect)
+        else:
+            (adds if effect.adds else deletes).append(facts.index[effect.atom])
+    return adds, deletes, conditional
+
+
 class Operators:
     """Ground actions, numbered as given, for whole tables of states at a time; None is idling.
 
@@ -104,18 +122,7 @@ class Operators:
         self.adds = np.zeros((len(actions), codec.fact_blocks), np.uint64)
         self.deletes = np.zeros_like(self.adds)
         self._required, self._forbidden = np.zeros_like(self.adds), np.zeros_like(self.adds)
-        required = [frozenset[int]()] * len(actions)
-        for number, action in enumerate(actions):
-            if action is None:
-                continue
-            literals, rest = split_condition(action.precondition, evaluator)
-            required[number] = frozenset(fact for fact, is_true in literals if is_true)
-            self._required[number] = codec.mask(required[number])
-            self._forbidden[number] = codec.mask(fact for fact, is_true in literals if not is_true)
-            for formula in rest:
-                kind = self.step_formulas if speaks_of_step(formula) else self._state_formulas
-                kind.setdefault(number, []).append(formula)
-            self._enter_effects(number, action)
+        required = [self._enter(number, action) for number, action in enumerate(actions)]
         self._has_forbidden = bool(self._forbidden.any())
         frequency = Counter(fact for facts in required for fact in facts)
         #: (actions, facts) those that each one requires, rare ones first; -1 to fill up.
@@ -127,14 +134,24 @@ class Operators:
         bounds = np.arange(-1, 64 * codec.fact_blocks + 1)
         self._first = np.searchsorted(self._facts[self._by_fact, 0], bounds)
 
-    def _enter_effects(self, number: int, action: GroundAction) -> None:
-        index = self._codec.facts.index
-        known = [effect for effect in action.effects if effect.atom in index]
-        certain = [effect for effect in known if effect.condition == TRUE]
-        self.adds[number] = self._codec.mask(index[e.atom] for e in certain if e.adds)
-        self.deletes[number] = self._codec.mask(index[e.atom] for e in certain if not e.adds)
-        if conditional := [effect for effect in known if effect.condition != TRUE]:
+    def _enter(self, number: int, action: GroundAction | None) -> frozenset[int]:
+        """Enter what an action needs and does; the facts that it requires."""
+        if action is None:
+            return frozenset()
+        literals, rest = split_condition(action.precondition, self._evaluator)
+        required = frozenset(fact for fact, is_true in literals if is_true)
+        forbidden = (fact for fact, is_true in literals if not is_true)
+        self._required[number], self._forbidden[number] = map(
+            self._codec.mask, (required, forbidden)
+        )
+        for formula in rest:
+            kind = self.step_formulas if speaks_of_step(formula) else self._state_formulas
+            kind.setdefault(number, []).append(formula)
+        adds, deletes, conditional = split_effects(action, self._codec.facts)
+        self.adds[number], self.deletes[number] = map(self._codec.mask, (adds, deletes))
+        if conditional:
             self.conditional[number] = conditional
+        return required
 
     def allows(self, row: Rows, action: int) -> bool:
         """Whether the conditions of an action on one state hold, as `applicable` finds many."""

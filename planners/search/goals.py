@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from planners.grounding.actions import GroundAction
-from planners.joint.conditions import split_condition
+from planners.joint.conditions import split_condition, split_effects
 from planners.joint.model import FullState, Goal, JointModel, show
 from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import required_atoms
-from planners.pddl.lifted import TRUE, Formula
+from planners.pddl.lifted import Formula
 
 #: What to try besides a larger limit.
 SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
@@ -48,20 +48,19 @@ class FactsOf(NamedTuple):
     @classmethod
     def of(cls, model: JointModel, action: GroundAction) -> FactsOf:
         """Those of an action; facts that are never true are left out."""
-        known = model.codec.facts.index
-        effects = [effect for effect in action.effects if effect.atom in known]
-        certain = [effect for effect in effects if effect.condition == TRUE]
-        adds = frozenset(known[effect.atom] for effect in certain if effect.adds)
+        adds, deletes, conditional = split_effects(action, model.codec.facts)
+        index = model.codec.facts.index
         return cls(
             _positive(model, action.precondition),
-            adds,
-            frozenset(known[effect.atom] for effect in certain if not effect.adds) - adds,
-            tuple(
-                (_positive(model, effect.condition), known[effect.atom], effect.adds)
-                for effect in effects
-                if effect.condition != TRUE
-            ),
+            frozenset(adds),
+            frozenset(deletes).difference(adds),
+            tuple((_positive(model, e.condition), index[e.atom], e.adds) for e in conditional),
         )
+
+    @property
+    def touched(self) -> frozenset[int]:
+        """The facts that it may change."""
+        return self.adds.union(self.deletes, (fact for _, fact, _ in self.conditional))
 
     def ways(self) -> Iterator[tuple[frozenset[int], frozenset[int]]]:
         """Every (facts that must be true, facts that become true together)."""
@@ -118,4 +117,4 @@ def _lacking(model: JointModel, goal: Goal) -> list[str]:
     said = [f"The goal needs {atom}, and nothing makes it true." for atom in missing[:1]]
     limited = () if missing else {one.robot for one in model.impossible if not one.is_fluent}
     never = [one for one in model.impossible if one.robot not in limited]
-    return said + [str(one) for one in never[:_SHOWN]]
+    return [*said, *map(str, never[:_SHOWN])]

@@ -19,7 +19,7 @@ from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import literals
-from planners.pddl.lifted import Atom, StepAtom
+from planners.pddl.lifted import StepAtom
 from planners.search.goals import FactsOf
 
 #: Predicates, each with a position of the object, that facts of one variable may have.
@@ -52,14 +52,13 @@ def _groups(model: JointModel, init: Rows) -> Iterator[StateVariable]:
     """Groups with a common object of whose facts exactly one is true, whatever actions do."""
     true = set(model.codec.true_facts(model.codec.facts_part(init)))
     read = [FactsOf.of(model, action) for action in model.actions]
-    touching: dict[Atom, list[int]] = defaultdict(list)
-    for number, action in enumerate(model.actions):
-        for atom in {effect.atom for effect in action.effects}:
-            touching[atom].append(number)
-    for facts in _candidates(model, true):
-        atoms = [model.codec.facts.atoms[fact] for fact in facts]
-        own = sorted({number for atom in atoms for number in touching[atom]})
-        changes = _changes(facts, {number: read[number] for number in own})
+    touching: dict[int, set[int]] = defaultdict(set)
+    for number, own in enumerate(read):
+        for fact in own.touched:
+            touching[fact].add(number)
+    for facts in dict.fromkeys(_candidates(model, true)):
+        touched = sorted(set[int]().union(*(touching[fact] for fact in facts)))
+        changes = _changes(facts, {number: read[number] for number in touched})
         if changes is not None and _one_at_a_time([model.actions[number] for number in changes]):
             yield StateVariable(tuple(sorted(facts)), changes)
 
@@ -74,40 +73,36 @@ def _is_linked(action: GroundAction) -> bool:
 
 
 def _candidates(model: JointModel, true: set[int]) -> Iterator[frozenset[int]]:
-    """Groups with a common object and one true fact; no group twice."""
-    shapes: dict[str, dict[tuple[str, int], list[int]]] = defaultdict(lambda: defaultdict(list))
+    """Groups with a common object and one true fact."""
+    for _, own in sorted(_shapes(model).items()):
+        usable = sorted(shape for shape, facts in own.items() if len(facts & true) <= 1)
+        for size in range(_SHAPES, 0, -1):
+            for chosen in combinations(usable, size):
+                facts = frozenset[int]().union(*(own[shape] for shape in chosen))
+                if len(facts) > 1 and len(facts & true) == 1:
+                    yield facts
+
+
+def _shapes(model: JointModel) -> dict[str, dict[tuple[str, int], set[int]]]:
+    """By object the facts about it: by predicate, and the position of the object."""
+    found: dict[str, dict[tuple[str, int], set[int]]] = defaultdict(lambda: defaultdict(set))
     for number, atom in enumerate(model.codec.facts.atoms):
         for position, name in enumerate(atom.args):
-            shapes[name][atom.predicate, position].append(number)
-    met: set[frozenset[int]] = set()
-    for name in sorted(shapes):
-        own = shapes[name]
-        count = {shape: sum(fact in true for fact in facts) for shape, facts in own.items()}
-        usable = sorted(shape for shape in own if count[shape] <= 1)
-        for size in range(min(_SHAPES, len(usable)), 0, -1):
-            for chosen in combinations(usable, size):
-                facts = frozenset(fact for shape in chosen for fact in own[shape])
-                true_ones = sum(count[shape] for shape in chosen)
-                if true_ones == 1 and len(facts) > 1 and facts not in met:
-                    met.add(facts)
-                    yield facts
+            found[name][atom.predicate, position].add(number)
+    return found
 
 
 def _changes(
     facts: frozenset[int], read: Mapping[int, FactsOf]
 ) -> dict[int, tuple[int, int]] | None:
-    """What actions do to a group; None if it may stop to have exactly one true fact."""
+    """What actions that touch a group do to it; None if a state may have not exactly one of it."""
     changes: dict[int, tuple[int, int]] = {}
     for number, own in read.items():
         adds, deletes, needs = own.adds & facts, own.deletes & facts, own.needs & facts
         if len(needs) > 1:
             continue  # never possible, as exactly one is true
-        if any(fact in facts for _, fact, _ in own.conditional) or len(adds) > 1:
+        if any(fact in facts for _, fact, _ in own.conditional) or len(adds) != 1:
             return None
-        if not adds:
-            if deletes:
-                return None
-            continue
         if not needs or not needs - adds <= deletes:
             return None
         if needs != adds:
