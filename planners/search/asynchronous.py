@@ -330,17 +330,14 @@ class Timing:
         ``plan`` are labels of the plan space, ``states`` those that it passes.
         """
         parts = [
-            [self._model.events[robot][number] for number in own if number]
+            [*(self._model.events[robot][number] for number in own if number), None]
             for robot, own in enumerate(zip(*plan, strict=True))
         ]
         done: list[list[Event]] = [[] for _ in parts]
         found: list[Step] = []
         for here, after in pairwise(states):
             row, end = self._space.rows[here], self._space.rows[after]
-            next_ones = [
-                own[len(past)] if len(past) < len(own) else None
-                for own, past in zip(parts, done, strict=True)
-            ]
+            next_ones = [own[len(past)] for own, past in zip(parts, done, strict=True)]
             found.append(self._step(row, end, next_ones, done))
             for own, event, label in zip(done, next_ones, found[-1], strict=True):
                 if event and label:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -144,22 +143,15 @@ class _RelaxedReach(NamedTuple):
 
     @classmethod
     def of(cls, model: JointModel, goal: Goal) -> _RelaxedReach:
-        wanted = goal_facts(model, goal)
-        ways: dict[int, set[tuple[int, ...]]] = {}
-        own = (FactsOf.of(model, action).ways() for action in model.actions)
-        for needs, added in chain.from_iterable(own):
-            for fact in added - needs:
-                ways.setdefault(fact, set()).add(tuple(sorted(needs)))
+        wanted, ways = goal_facts(model, goal), _ways(model)
         relevant, todo = set(wanted), list(wanted)
         while todo:
-            below = {n for needs in ways.get(todo.pop(), ()) for n in needs} - relevant
+            below = set[int]().union(*ways[todo.pop()]) - relevant
             relevant |= below
             todo += below
         always = (len(model.codec.facts),)
         kept = [
-            (needs or always, fact)
-            for fact in sorted(relevant)
-            for needs in sorted(ways.get(fact, ()))
+            (needs or always, fact) for fact in sorted(relevant) for needs in sorted(ways[fact])
         ]
         facts = np.array([fact for _, fact in kept], np.int64)
         made, first_way = np.unique(facts, return_index=True)
@@ -194,6 +186,16 @@ class _RelaxedReach(NamedTuple):
         """In which states all wanted facts have been true."""
         there: Bools = unpacked(np.bitwise_and.reduce(bits[self.wanted])[None], count)[0]
         return there
+
+
+def _ways(model: JointModel) -> dict[int, set[tuple[int, ...]]]:
+    """By fact what is needed together for an effect that makes it true."""
+    ways: dict[int, set[tuple[int, ...]]] = defaultdict(set)
+    for action in model.actions:
+        for needs, added in FactsOf.of(model, action).ways():
+            for fact in added - needs:
+                ways[fact].add(tuple(sorted(needs)))
+    return ways
 
 
 class _OwnVariable(NamedTuple):

@@ -189,21 +189,32 @@ def only_one_plan(text: str, position: Position) -> None:
     numbers that start again: they may repeat.
     """
     begun = ended = False
-    numbers: list[int] = []  # of the actions so far; one without a number is in the step before
+    numbers: list[int] = []  # of the actions so far
     for line, raw in enumerate(_LINE_END.split(text), 1):
-        title, action = bool(_BEGIN.match(raw)), raw.partition(";")[0].strip()
-        found = re.match(r"(\d{1,8})(?:\.\d+)?\s*:", action)
-        number = int(found[1]) if found else numbers[-1] if numbers else -1
-        again = bool(numbers) and number == numbers[0] < numbers[-1]
-        if (action and (ended or again)) or (title and (begun or numbers)):
+        second, action = False, raw.partition(";")[0].strip()
+        if action:
+            number = _step_number(action, numbers)
+            second = ended or (numbers[:1] == [number] and number < numbers[-1])
+            begun = True
+            numbers.append(number)
+        elif _BEGIN.match(raw):
+            second, begun = begun, True
+        elif numbers and _END.match(raw):
+            ended = True
+        if second:
             raise BadInput(
                 "this file holds several plans: a second one begins here",
                 position=Position(position.file, line, 1),
                 remedy="Write one plan a file (`coordlang plans --max 1`), or use the JSON form.",
             )
-        begun, ended = begun or title, ended or (bool(numbers) and bool(_END.match(raw)))
-        if action:
-            numbers.append(number)
+
+
+def _step_number(action: str, before: Sequence[int]) -> int:
+    """The step of an action; one without a number is in the step before."""
+    found = re.match(r"(\d{1,8})(?:\.\d+)?\s*:", action)
+    if found:
+        return int(found[1])
+    return before[-1] if before else -1
 
 
 def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[Texts, ...]]:

@@ -8,8 +8,9 @@ only where an effect changes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import combinations
+from collections import defaultdict
+from collections.abc import Container, Iterator, Sequence
+from itertools import accumulate, combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -44,13 +45,11 @@ class PlanFormula:
         stepper = model.stepper
         assert isinstance(stepper, ComposingStepper)
         self._model, self._stepper, facts = model, stepper, len(model.codec.facts)
-        counts = [len(own) for own in model.labels]
-        self._first_label = [facts + 1 + sum(counts[:robot]) for robot in range(len(counts))]
-        self.size = facts + sum(counts)
+        *self._first_label, end = accumulate(map(len, model.labels), initial=facts + 1)
+        self.size = end - 1
         self.step: list[tuple[int, ...]] = []
-        #: Per fact the literals that make it true in the next state, and false.
-        self._adders: list[Literals] = [[] for _ in range(facts)]
-        self._deleters: list[Literals] = [[] for _ in range(facts)]
+        #: By fact and value the literals that give it this value in the next state.
+        self._makers: dict[tuple[int, bool], Literals] = defaultdict(list)
         #: Per robot and some of its labels, as bytes, the variable that they imply.
         self._implied: dict[tuple[int, bytes], int] = {}
         variables = state_variables(model, task.init)
@@ -65,9 +64,9 @@ class PlanFormula:
             self._apart(i, j)
         self._never_together(variables, task.init)
         goal = self._goal_clauses(task.goal)
-        begins, true = self._fresh(), set(model.codec.true_facts(task.init))
-        for fact in range(facts):
-            self.step.append((-begins, fact + 1 if fact in true else -(fact + 1)))
+        begins = self._fresh()
+        begin = self._just(set(model.codec.true_facts(task.init)))
+        self.step += [(-begins, literal) for literal in begin]
         self._facts_follow()
         self._flat_step, self._goal = flat_clauses(self.step), flat_clauses(goal)
 
@@ -150,7 +149,7 @@ class PlanFormula:
             fires = chosen
             if effect.condition != TRUE:
                 fires = self._fires(robot, label, effect.condition)
-            (self._adders if effect.adds else self._deleters)[index[effect.atom]].append(fires)
+            self._makers[index[effect.atom], effect.adds].append(fires)
 
     def _fires(self, robot: int, label: int, condition: Formula) -> int:
         """A variable for: the label is chosen, and the condition of an effect holds."""
@@ -197,8 +196,8 @@ class PlanFormula:
 
     def _facts_follow(self) -> None:
         """What is true in the next state; added facts are, whatever deletes them, too."""
-        for fact in range(len(self._adders)):
-            now, adders, deleters = fact + 1, self._adders[fact], self._deleters[fact]
+        for fact in range(len(self._model.codec.facts)):
+            now, adders, deleters = fact + 1, self._makers[fact, True], self._makers[fact, False]
             then = now + self.size
             self.step += [(-adder, then) for adder in adders]
             self.step += [(-deleter, *adders, -then) for deleter in deleters]
@@ -206,9 +205,13 @@ class PlanFormula:
 
     def _goal_clauses(self, goal: Goal) -> list[list[int]]:
         if isinstance(goal, FullState):
-            facts = range(len(self._adders))
-            return [[fact + 1 if fact in goal.facts else -(fact + 1)] for fact in facts]
+            return [[literal] for literal in self._just(set(goal.facts))]
         return self._saying(goal)
+
+    def _just(self, true: Container[int]) -> Literals:
+        """The literals of the one state in which these facts are true."""
+        facts = range(1, len(self._model.codec.facts) + 1)
+        return [fact if fact - 1 in true else -fact for fact in facts]
 
 
 def _unique(table: Bools) -> tuple[Bools, Ints]:

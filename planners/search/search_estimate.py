@@ -101,15 +101,15 @@ def estimate(
     bound = 0 if heuristic.value is None else int(heuristic.value(start)[0])
     choices = model.stepper.choices(model.codec.facts_part(start))
     found = SearchEstimate(
-        labels={robot: len(own) for robot, own in zip(model.robots, model.labels, strict=True)},
+        labels=dict(zip(model.robots, map(len, model.labels), strict=True)),
         choices={robot: len(own) for robot, (_, own) in zip(model.robots, choices, strict=True)},
         layers=tuple(len(rows) for rows in layers if len(rows)),
         next_steps=_most_steps(model, layers[-1]) if len(layers[-1]) else None,
         makespan=makespan,
-        hmax=hmax if hmax < FAR else None,
+        hmax=_finite(hmax),
         heuristic=heuristic.name,
-        at_least=bound if bound < FAR else None,
-        within=tuple(_within(heuristic.value, layers, bound)) if heuristic.value else (),
+        at_least=_finite(bound),
+        within=tuple(_within(heuristic.value, layers, bound)),
         solver_after=probe_size(model, bound, PIECES) if heuristic.exact else None,
     )
     return found, layers
@@ -129,12 +129,16 @@ def _layers(model: JointModel, start: Rows, steps: int, states: int) -> list[Row
     return layers
 
 
-def _within(value: Values, layers: Sequence[Rows], bound: int) -> Iterator[int]:
+def _finite(bound: int) -> int | None:
+    return bound if bound < FAR else None
+
+
+def _within(value: Values | None, layers: Sequence[Rows], bound: int) -> Iterator[int]:
     """The states of each layer that are within a bound, of `_BOUNDED` states in all."""
     left = _BOUNDED
     for depth, rows in enumerate(layers):
         left -= len(rows)
-        if left < 0 or bound >= FAR or not len(rows):
+        if value is None or left < 0 or bound >= FAR or not len(rows):
             return
         count = int((value(rows) + depth <= bound).sum())
         yield count
