@@ -206,8 +206,6 @@ class _Unfolding:
             earlier = tuple(map(max, own, earlier))
             if waits or any(alone(block, first)) or not traces.allows(row, own):
                 continue
-            if not traces.interfere(block, own, first) and not traces.interfere(block, own, rest):
-                return True  # they commute with all of both steps
             steps = tuple(map(max, own, first)), rest
             if traces.leads(row, steps, end) and (
                 traces.events(row, steps) == traces.events(row, (first, second))
