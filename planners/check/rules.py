@@ -11,15 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from planners.check.meaning import (
-    Binding,
-    Literal,
-    Meaning,
-    Moment,
-    State,
-    ground_atom,
-    text_of,
-)
+from planners.check.meaning import Binding, Literal, Meaning, Moment, State, ground_atom, text_of
 from planners.pddl.lifted import (
     And,
     Atom,

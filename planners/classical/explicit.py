@@ -49,18 +49,18 @@ def _joint_steps(team: Selectors, limit: int) -> list[tuple[int, ...]]:
 
 def _with_choices(team: Selectors, step: tuple[int, ...], robot: int) -> Iterator[tuple[int, ...]]:
     """A set of actions of the robots before, with what this one may choose first."""
-    taken = {owner for number in step for owner in team.owners[number]}
+    taken = {owner for number in step for owner in team.actions[number].owners}
     if robot in taken or team.idling[robot] is not None:
         yield step
-    for number, owners in enumerate(team.owners):
-        is_free = owners[0] == robot and taken.isdisjoint(owners)
+    for number, action in enumerate(team.actions):
+        is_free = action.owners[0] == robot and taken.isdisjoint(action.owners)
         if is_free and team.clashes[number].isdisjoint(step):
             yield (*step, number)
 
 
 def _parts(team: Selectors, step: Sequence[int]) -> Sequence[str | None]:
     """What each robot does in a joint action, the same for ground actions that do the same."""
-    chosen = {robot: team.actions[n].label for n in step for robot in team.owners[n]}
+    chosen = {robot: team.actions[n].label for n in step for robot in team.actions[n].owners}
     whole = next((team.actions[n].parts for n in step), ())
     return whole or [chosen.get(robot) for robot in range(len(team.names))]
 

@@ -14,14 +14,7 @@ from planners.classical.selectors import Selectors
 from planners.classical.task import Known, Labels
 from planners.classical.writer import Writer, known_literals, own_fact
 from planners.joint.model import JointModel
-from planners.pddl.formula_tree import (
-    GroundLeaf,
-    conjuncts,
-    joined,
-    literals,
-    signed,
-    substituted,
-)
+from planners.pddl.formula_tree import GroundLeaf, conjuncts, joined, literals, signed, substituted
 from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Or, StepAtom
 
 #: The stages after selecting, in their order.
@@ -54,8 +47,10 @@ class StagedAction:
     def __init__(
         self, team: Selectors, number: int, value: Callable[[GroundLeaf], Formula]
     ) -> None:
-        action, (self.robot, *self.others) = team.actions[number], team.owners[number]
-        self.number, self.label, self.clashes = number, action.label, team.clashes[number]
+        action = team.actions[number]
+        self.robot, *self.others = action.owners
+        self.number, self.label, self.cost = number, action.label, action.cost
+        self.clashes = team.clashes[number]
         #: In joint-action PDDL, where one team selects, what all robots do.
         self.labels: Labels = tuple(enumerate(action.parts)) or ((self.robot, action.label),)
         self.selected = selected(team, self.robot, self.label)
@@ -199,8 +194,8 @@ def select_then_apply(team: Selectors, model: JointModel, goal: Formula, step_co
     Robots without work skip a stage, and a step without work left ends when all have selected.
     """
     who = {
-        StepAtom(action.schema, action.args): selected(team, owners[0], action.label)
-        for action, owners in zip(team.actions, team.owners, strict=True)
+        StepAtom(action.schema, action.args): selected(team, action.owners[0], action.label)
+        for action in team.actions
     }
 
     def value(leaf: GroundLeaf) -> Formula:
@@ -230,7 +225,9 @@ class _SelectThenApply:
         self._choosing = [own_fact("time to choose", name) for name in team.names]
         self._first = self._choosing[0]
         #: Robots that select a shared action first, with those who may have to join.
-        self._calls = sorted({(own[0], other) for own in team.owners for other in own[1:]})
+        self._calls = sorted(
+            {(action.robot, other) for action in actions for other in action.others}
+        )
         busy = {(stage, action.robot) for action in self._actions for stage in action.stages}
         order = sorted(busy, key=lambda one: (STAGES.index(one[0]), one[1]))
         facts = [own_fact(f"time to {stage}", team.names[robot]) for stage, robot in order]
@@ -297,9 +294,9 @@ class _SelectThenApply:
             over = {action.mark}
         # What is over was true: to say so spares readers a conditional effect.
         known |= dict.fromkeys(over, True)
-        cost, late = self._team.seconds[action.number], not action.at_once
+        cost, labels, late = action.cost, action.labels, not action.at_once
         self._choose(
-            robot, action.label, robot, known, adds, deletes | over, cost, action.labels, late=late
+            robot, action.label, robot, known, adds, deletes | over, cost, labels, late=late
         )
 
     def _choose(

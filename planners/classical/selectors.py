@@ -26,48 +26,43 @@ from planners.pddl.lifted import FALSE, And, Atom, Equal, Formula, StepAtom, Tru
 class Selectors:
     """Who selects what: each robot its subactions; in joint-action PDDL the team, joint actions.
 
-    ``idling`` is the second cost of idling for each of them, None for a team that always acts;
-    ``actions`` are over facts of the model; ``owners``, ``seconds`` (second costs) and ``clashes``
-    (those of others that cannot share a step with it) are by action.
+    ``idling`` is the second cost of idling for each of them, None for a team that always acts.
+    ``actions`` are over facts of the model, their ``owners`` are selectors, ``cost`` is their
+    second cost; ``clashes`` are, by action, those of others that cannot share a step with it.
     """
 
     names: tuple[str, ...]
     idling: tuple[int | None, ...]
     actions: tuple[GroundAction, ...]
-    owners: tuple[tuple[int, ...], ...]
-    seconds: tuple[int, ...]
     clashes: tuple[frozenset[int], ...]
 
     def second_cost(self, step: Sequence[int]) -> int:
         """The second cost of a joint step: of its actions, and of those who idle in it."""
-        busy = {owner for number in step for owner in self.owners[number]}
+        busy = {owner for number in step for owner in self.actions[number].owners}
         idle = sum(cost or 0 for own, cost in enumerate(self.idling) if own not in busy)
-        return idle + sum(self.seconds[number] for number in step)
+        return idle + sum(self.actions[number].cost for number in step)
 
     @property
     def highest_cost(self) -> int:
         """The most that one joint step can add to the second cost."""
         most = [cost or 0 for cost in self.idling]
-        for owners, second in zip(self.owners, self.seconds, strict=True):
-            most[owners[0]] = max(most[owners[0]], second)
+        for action in self.actions:
+            most[action.owners[0]] = max(most[action.owners[0]], action.cost)
         return sum(most)
 
 
 def selectors_of(model: JointModel) -> Selectors:
     """Who selects what in a joint model, at what second cost."""
-    actions = tuple(_on_facts(action, model) for action in model.actions)
-    seconds = tuple(action.second_cost(model.cost) for action in actions)
+    actions = [_on_facts(action, model) for action in model.actions]
     if model.is_joint_action:
-        owners, nothing = ((0,),) * len(actions), (frozenset[int](),) * len(actions)
-        alone = _one_of_each(actions, seconds)
-        return Selectors(("team",), (None,), alone, owners, seconds, nothing)
-    by = tuple(action.owners for action in actions)
+        nothing = (frozenset[int](),) * len(actions)
+        return Selectors(("team",), (None,), _one_of_each(actions), nothing)
     idling, apart = tuple(model.idling_costs), clashes(model.actions)
-    return Selectors(model.robots, idling, actions, by, seconds, apart)
+    return Selectors(model.robots, idling, tuple(actions), apart)
 
 
 def _on_facts(action: GroundAction, model: JointModel) -> GroundAction:
-    """An action whose formulas and effects are over facts of the model only."""
+    """An action whose formulas and effects are over facts of the model, with its second cost."""
     reader, facts = state_reader(model), model.codec.facts
     effects = [
         replace(effect, condition=substituted(effect.condition, reader))
@@ -75,23 +70,22 @@ def _on_facts(action: GroundAction, model: JointModel) -> GroundAction:
         if effect.atom in facts
     ]
     precondition = substituted(action.precondition, reader)
-    return replace(action, precondition=precondition, effects=tuple(effects))
+    cost = action.second_cost(model.cost)
+    return replace(action, precondition=precondition, effects=tuple(effects), cost=cost)
 
 
-def _one_of_each(
-    actions: Sequence[GroundAction], seconds: Sequence[int]
-) -> tuple[GroundAction, ...]:
+def _one_of_each(actions: Sequence[GroundAction]) -> tuple[GroundAction, ...]:
     """Joint actions that are not done where a cheaper (or earlier) one has the same parts.
 
     Where both are applicable they are one joint action, and the cheaper one stands for both.
     """
     alone = [*actions]
     before: dict[tuple[str | None, ...], list[Formula]] = defaultdict(list)
-    for number in sorted(range(len(actions)), key=lambda n: (seconds[n], n)):
+    for number in sorted(range(len(actions)), key=lambda n: (actions[n].cost, n)):
         action = actions[number]
         others = before[action.parts]
         precondition = joined(And, (action.precondition, *map(negated, others)))
-        alone[number] = replace(action, precondition=precondition)
+        alone[number] = replace(action, precondition=precondition, owners=(0,))
         others.append(action.precondition)
     return tuple(alone)
 
