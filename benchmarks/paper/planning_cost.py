@@ -96,8 +96,7 @@ def manhattan(model: JointModel, goal: Goal, _: Sequence[StateVariable]) -> Valu
 
     def value(rows: Rows) -> Ints:
         true = TrueFacts(model.codec.facts_part(rows))
-        bounds: Ints = true.reduced(np.maximum, np.array(away), 0)
-        return bounds
+        return true.greatest(np.array(away))
 
     return value
 

@@ -8,7 +8,8 @@ downwards.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from itertools import product
 
 from planners.pddl.lifted import (
@@ -53,12 +54,11 @@ class Meaning:
     """The meaning of the formulas of a problem, for its objects, static atoms and team."""
 
     def __init__(self, domain: Domain, problem: Problem, team: Team) -> None:
-        self._domain = domain
-        self._problem = problem
-        self._team = team
+        self._problem, self._team = problem, team
         self._fluents = fluent_predicates(domain)
         self.schemas = {schema.name: schema for schema in domain.schemas}
-        self._members: dict[tuple[str, ...], tuple[str, ...]] = {}
+        #: The objects of one of some types.
+        self.objects = cache(partial(objects_of, domain, problem))
 
     def holds(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> bool:
         """Whether a formula (negated unless ``positive``) holds."""
@@ -74,6 +74,12 @@ class Meaning:
         atom = _ground(formula, binding)
         true = moment.state if isinstance(atom, Atom) else moment.step
         return true is None or (atom in true) == positive
+
+    def fails(self, formula: Formula, binding: Binding, moment: Moment) -> str | None:
+        """Why a formula does not hold, in words; None if it does."""
+        if self.holds(formula, binding, True, moment):
+            return None
+        return self.why_not(formula, binding, True, moment)
 
     def why_not(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> str:
         """Why a formula that does not hold does not hold, in words."""
@@ -166,12 +172,6 @@ class Meaning:
                 return f"{binding.get(left, left)} and {binding.get(right, right)} {what}"
         return "its condition is never true"
 
-    def objects(self, types: tuple[str, ...]) -> tuple[str, ...]:
-        """The objects of one of these types."""
-        if types not in self._members:
-            self._members[types] = objects_of(self._domain, self._problem, types)
-        return self._members[types]
-
     def fluents_of(self, atoms: Iterable[Atom]) -> State:
         """The state that a list of true atoms describes."""
         return frozenset(atom for atom in atoms if atom.predicate in self._fluents)
@@ -188,12 +188,8 @@ def ground_atom(atom: Atom, binding: Binding) -> Atom:
 
 
 def _ground(formula: Formula, binding: Binding) -> Atom | StepAtom:
-    match formula:
-        case Atom():
-            return ground_atom(formula, binding)
-        case StepAtom(name, args):
-            return StepAtom(name, tuple(binding.get(arg, arg) for arg in args))
-    raise AssertionError(formula)
+    assert isinstance(formula, Atom | StepAtom), formula
+    return replace(formula, args=tuple(binding.get(arg, arg) for arg in formula.args))
 
 
 def text_of(atom: Atom | StepAtom) -> str:

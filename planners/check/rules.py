@@ -157,8 +157,7 @@ class Rules:
             if action is None:
                 continue
             formula, moment = action.schema.precondition, Moment(state, step, action.owners)
-            if not self.meaning.holds(formula, action.binding, True, moment):
-                why = self.meaning.why_not(formula, action.binding, True, moment)
+            if why := self.meaning.fails(formula, action.binding, moment):
                 return f"{self.team.robots[robot]} cannot do {action.text} here: {why}"
         return None
 
@@ -276,11 +275,10 @@ class Rules:
         results: dict[State, str] = {}
         actions = [a for a in self._whole_actions(labels) if name in (None, a.text)]
         for number, action in enumerate(actions):
-            formula, moment = action.schema.precondition, Moment(state)
-            if self.meaning.holds(formula, action.binding, True, moment):
+            why = self.meaning.fails(action.schema.precondition, action.binding, Moment(state))
+            if why is None:
                 results.setdefault(self._after(state, (action,)), action.text)
             elif not number:
-                why = self.meaning.why_not(formula, action.binding, True, moment)
                 reason = f"{action.text} is not applicable: {why}"
         if len(results) > 1:
             first, second = sorted(results.values())[:2]
@@ -392,9 +390,6 @@ def validate(
             return Verdict(False, number, after)
         state = after
     wanted = problem.goal if goal is None else goal
-    at_end = Moment(state)
-    if not rules.meaning.holds(wanted, {}, True, at_end):
-        why = rules.meaning.why_not(wanted, {}, True, at_end)
-        reason = f"the goal does not hold at the end: {why}"
-        return Verdict(False, len(plan), reason)
+    if why := rules.meaning.fails(wanted, {}, Moment(state)):
+        return Verdict(False, len(plan), f"the goal does not hold at the end: {why}")
     return Verdict(True, None, "every step is a joint step and the goal holds at the end")

@@ -69,21 +69,21 @@ def speaks_of_step(formula: Formula) -> bool:
 
 def split_condition(
     precondition: Formula, evaluator: Evaluator
-) -> tuple[list[tuple[int, bool]], list[Formula]]:
-    """Literals (fact number, positive) and the rest of a precondition.
+) -> tuple[frozenset[int], frozenset[int], list[Formula]]:
+    """The facts that literals of a precondition need to be true, and false; and the rest of it.
 
     Negative step literals are left out (the compatibility table has them), and negative literals on
     facts that are never true.
     """
-    known: list[tuple[int, bool]] = []
+    known: dict[bool, list[int]] = {True: [], False: []}
     rest: list[Formula] = []
     for part in conjuncts(precondition):
         inner, positive = signed(part)
         if isinstance(inner, Atom) and inner in evaluator.facts:
-            known.append((evaluator.facts.index[inner], positive))
+            known[positive].append(evaluator.facts.index[inner])
         elif positive or not isinstance(inner, GroundLeaf):
             rest.append(part)
-    return known, rest
+    return frozenset(known[True]), frozenset(known[False]), rest
 
 
 def split_effects(
@@ -138,12 +138,9 @@ class Operators:
         """Enter what an action needs and does; the facts that it requires."""
         if action is None:
             return frozenset()
-        literals, rest = split_condition(action.precondition, self._evaluator)
-        required = frozenset(fact for fact, is_true in literals if is_true)
-        forbidden = (fact for fact, is_true in literals if not is_true)
-        self._required[number], self._forbidden[number] = map(
-            self._codec.mask, (required, forbidden)
-        )
+        required, forbidden, rest = split_condition(action.precondition, self._evaluator)
+        self._required[number] = self._codec.mask(required)
+        self._forbidden[number] = self._codec.mask(forbidden)
         for formula in rest:
             kind = self.step_formulas if speaks_of_step(formula) else self._state_formulas
             kind.setdefault(number, []).append(formula)

@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,11 +173,9 @@ class StateCodec:
         robot, _, name = atom[len("(last ") : -1].partition(" ")
         if robot in self.robots:
             position = self.robots.index(robot)
-            if name == "none":
-                return
-            if name in self.memory[position]:
-                number = self.memory[position].index(name) + 1
-                row[self.fact_blocks + position] = np.uint64(number)
+            names = ("none", *self.memory[position])
+            if name in names:
+                row[self.fact_blocks + position] = np.uint64(names.index(name))
                 return
         raise BadInput(
             f"{atom} names no robot's subaction of this model",
@@ -240,10 +237,10 @@ class TrueFacts:
         """The row of each entry."""
         return np.repeat(np.arange(len(self.counts)), self.counts)
 
-    def reduced(self, of: np.ufunc, values: NDArray[np.generic], empty: int) -> Any:
-        """Per row the values of its facts reduced by ``of``; ``empty`` where none is true."""
-        result = np.full(len(self.counts), empty, values.dtype)
+    def greatest(self, values: NDArray[np.int64]) -> Ints:
+        """Per row the greatest of the values of its facts; 0 where none is true."""
+        result = np.zeros(len(self.counts), np.int64)
         some = np.flatnonzero(self.counts)
         if len(some):
-            result[some] = of.reduceat(values[self.fact], self.first[some])
+            result[some] = np.maximum.reduceat(values[self.fact], self.first[some])
         return result

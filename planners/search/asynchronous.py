@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise, permutations, product
 
 import numpy as np
@@ -77,10 +77,10 @@ class _Unfolding:
         self._waits = _Waits(space, self._traces)
         #: By facts, first and second step whether something of the second may be done sooner.
         self._sooner: dict[tuple[bytes, Step, Step], bool] = {}
-        self._met_by: dict[tuple[Step, Step], tuple[Step, Rows]] = {}
+        self._met_by = cache(self._met)
         self._labels: list[Step] = [tuple(row) for row in space.labels.tolist()]
         self._targets: list[int] = space.targets().tolist()
-        self._allowed: dict[int, tuple[int, ...]] = {}
+        self._next = cache(self._not_late)
         self.events: list[dict[Event, int]] = [{} for _ in self._robots]
         self._layers: list[dict[object, _Node]] = [{} for _ in space.layers]
         self._graph = _Graph()
@@ -150,12 +150,10 @@ class _Unfolding:
             after = self._node(self._targets[edge], past, idles, self._next(edge, here.node))
             here.moves.append((tuple(numbers), edge, after))
 
-    def _next(self, edge: int, source: int) -> tuple[int, ...]:
+    def _not_late(self, edge: int, source: int) -> tuple[int, ...]:
         """The edges after one of which no event could be done in its step already."""
-        if edge not in self._allowed:
-            out = self._space.out_edges(self._targets[edge])
-            self._allowed[edge] = tuple(e for e in out if not self._is_late(source, edge, e))
-        return self._allowed[edge]
+        out = self._space.out_edges(self._targets[edge])
+        return tuple(after for after in out if not self._is_late(source, edge, after))
 
     def _is_late(self, source: int, edge: int, after: int) -> bool:
         """Whether some events of a step may be done in the step before, and it is the same plan.
@@ -167,9 +165,7 @@ class _Unfolding:
         for group in self._traces.groups(second) if idle else ():
             if not idle.isdisjoint(group):
                 own = alone(group, second)
-                if (first, own) not in self._met_by:
-                    self._met_by[first, own] = self._met(first, own)
-                before, facts = self._met_by[first, own]
+                before, facts = self._met_by(first, own)
                 row = self._space.rows[self._space.state[source]]
                 key = (row & facts).tobytes(), before, own
                 if key not in self._sooner:
@@ -289,14 +285,12 @@ class _Waits:
         self._by_label = [np.zeros((len(names), width), np.int16) for names in space.model.labels]
         for j, columns, patterns in added:
             self._by_label[j][:, columns] = patterns.T
-        self._added: dict[Step, Ints] = {}
+        #: (columns) what the events of a step add.
+        self.added = cache(self._sum)
 
-    def added(self, step: Step) -> Ints:
-        """(columns) what the events of a step add."""
-        if step not in self._added:
-            rows = [own[label] for own, label in zip(self._by_label, step, strict=True) if label]
-            self._added[step] = np.sum(rows, axis=0, dtype=np.int16) if rows else self.none
-        return self._added[step]
+    def _sum(self, step: Step) -> Ints:
+        rows = [own[label] for own, label in zip(self._by_label, step, strict=True) if label]
+        return np.sum(rows, axis=0, dtype=np.int16) if rows else self.none
 
     def of(self, past: Ints, step: Step, robot: int, other: int) -> int:
         """How many events of another robot a robot's event of a step waits for, of the past."""

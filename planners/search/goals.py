@@ -49,12 +49,16 @@ class FactsOf(NamedTuple):
     def of(cls, model: JointModel, action: GroundAction) -> FactsOf:
         """Those of an action; facts that are never true are left out."""
         adds, deletes, conditional = split_effects(action, model.codec.facts)
-        index = model.codec.facts.index
+        index, evaluator = model.codec.facts.index, model.evaluator
+
+        def needs(condition: Formula) -> frozenset[int]:
+            return split_condition(condition, evaluator)[0]
+
         return cls(
-            _positive(model, action.precondition),
+            needs(action.precondition),
             frozenset(adds),
             frozenset(deletes).difference(adds),
-            tuple((_positive(model, e.condition), index[e.atom], e.adds) for e in conditional),
+            tuple((needs(e.condition), index[e.atom], e.adds) for e in conditional),
         )
 
     @property
@@ -69,12 +73,6 @@ class FactsOf(NamedTuple):
         for needs, fact, adds in self.conditional:
             if adds:
                 yield self.needs | needs, frozenset((fact,))
-
-
-def _positive(model: JointModel, formula: Formula) -> frozenset[int]:
-    """The facts that single literals of a condition need to be true."""
-    literals, _ = split_condition(formula, model.evaluator)
-    return frozenset(fact for fact, positive in literals if positive)
 
 
 def searched(model: JointModel, goal: Goal, seen: Rows, left_out: int = 0) -> str:

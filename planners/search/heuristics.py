@@ -232,9 +232,7 @@ class Projections:
 
     def value(self, rows: Rows) -> Ints:
         """The lower bound for each state, `FAR` where the goal cannot be reached."""
-        true = TrueFacts(self._codec.facts_part(rows))
-        bounds: Ints = true.reduced(np.maximum, self._of_fact, 0)
-        return bounds
+        return TrueFacts(self._codec.facts_part(rows)).greatest(self._of_fact)
 
     def in_time(self, rows: Rows, options: Options, left: int) -> tuple[Options, int]:
         """The robots' options after which no variable of their own needs more than ``left`` steps.
@@ -249,7 +247,7 @@ class Projections:
             state = np.repeat(np.arange(len(rows)), np.diff(first))
             need = np.zeros(len(label), np.int64)
             for variable in own:
-                here: Ints = true.reduced(np.maximum, variable.distance, 0)
+                here = true.greatest(variable.distance)
                 after = variable.after[label]
                 need = np.maximum(need, np.where(after >= 0, after, here[state]))
             good = need <= left
