@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from planners.classical.selectors import Selectors
 from planners.classical.task import Known, Labels
-from planners.classical.writer import Writer, known_literals, own_fact
+from planners.classical.writer import Route, Writer, known_literals, own_fact
 from planners.joint.model import JointModel
 from planners.pddl.formula_tree import GroundLeaf, conjuncts, joined, literals, signed, substituted
 from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Or, StepAtom
@@ -272,7 +272,7 @@ class _SelectThenApply:
         self.out.init = {self.out.between, *map(self.out.fact, sorted(self._restored, key=str))}
         done = self.out.end(formula, {self._first: True})
         if done is not None:
-            self.out.route("reach the goal", formula, self._first, done, {})
+            Route(self.out, "reach the goal", {}).lead(formula, self._first, done)
 
     # -- select
 
@@ -385,13 +385,12 @@ class _SelectThenApply:
         name, known = f"check {action.label}", {action.selected: True}
         if action.checks != TRUE:
             end = self.out.phase() if action.groups else after
-            self.out.route(name, action.checks, here, end, known)
+            Route(self.out, name, known).lead(action.checks, here, end)
             here = end
         for k, (condition, _) in enumerate(action.groups):
             end = after if k + 1 == len(action.groups) else self.out.phase()
-            gain = (action.fires(k),)
-            group = f"{name} fires {k} or not"
-            self.out.route(group, condition, here, end, known, gain, otherwise=end)
+            route = Route(self.out, f"{name} fires {k} or not", known)
+            route.lead(condition, here, end, (action.fires(k),), otherwise=end)
             here = end
 
     def _perform(self, action: StagedAction, here: Atom, after: Atom, *, early: bool) -> None:

@@ -5,11 +5,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from planners.classical.task import ClassicalAction, Condition, Known, Labels
 from planners.joint.model import FullState, Goal, JointModel
 from planners.pddl.formula_tree import GroundLeaf, conjuncts, negated, signed, substituted
-from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, Not
+from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, Not, Or
+
+#: Facts that become true where a formula holds.
+Gain = tuple[Atom, ...]
 
 
 class TooManyError(Exception):
@@ -75,75 +79,69 @@ class Writer:
         self._phases += 1
         return own_fact("at place", str(self._phases))
 
-    def route(
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """Zero-cost actions of one ``name`` for formulas, where ``known`` is true.
+
+    Formulas are evaluated from left to right, as in a programming language, so that there is one
+    way in every state, and the size is linear.
+    """
+
+    out: Writer
+    name: str
+    known: Known
+
+    def lead(
         self,
-        name: str,
         formula: Formula,
         start: Atom,
         end: Atom,
-        known: Known,
-        gain: tuple[Atom, ...] = (),
+        gain: Gain = (),
         otherwise: Atom | None = None,
     ) -> None:
-        """Zero-cost actions from ``start`` to ``end`` that apply exactly if ``formula`` holds.
+        """Lead from ``start`` to ``end`` exactly if ``formula`` holds, and add ``gain``.
 
-        They also add ``gain``.  With ``otherwise`` they lead there if it does not hold.  Formulas
-        are evaluated from left to right, as in a programming language, so that there is one way in
-        every state, and the size is linear.
+        With ``otherwise`` lead there if it does not hold.
         """
-        if not isinstance(formula, Junction) or (isinstance(formula, And) and otherwise is None):
-            self._conjunction(name, formula, start, end, known, gain)
-            if otherwise is not None:
-                self._conjunction(name, negated(formula), start, otherwise, known)
+        if isinstance(formula, Junction) and (isinstance(formula, Or) or otherwise is not None):
+            self._in_turn(formula, start, end, gain, otherwise)
             return
-        self._in_turn(name, formula, start, end, known, gain, otherwise)
+        self._conjunction(formula, start, end, gain)
+        if otherwise is not None:
+            self._conjunction(negated(formula), start, otherwise, ())
 
     def _in_turn(
-        self,
-        name: str,
-        formula: Junction,
-        start: Atom,
-        end: Atom,
-        known: Known,
-        gain: tuple[Atom, ...],
-        otherwise: Atom | None = None,
+        self, formula: Junction, start: Atom, end: Atom, gain: Gain, otherwise: Atom | None
     ) -> None:
-        """A route by one part after another; the last one decides."""
+        """One part after another; the last one decides."""
         *first, last = formula.parts
         for part in first:
-            after = self.phase()
+            after = self.out.phase()
             if isinstance(formula, And):
-                self.route(name, part, start, after, known, otherwise=otherwise)
+                self.lead(part, start, after, otherwise=otherwise)
             else:
-                self.route(name, part, start, end, known, gain, after)
+                self.lead(part, start, end, gain, after)
             start = after
-        self.route(name, last, start, end, known, gain, otherwise)
+        self.lead(last, start, end, gain, otherwise)
 
-    def _conjunction(
-        self,
-        name: str,
-        formula: Formula,
-        start: Atom,
-        end: Atom,
-        known: Known,
-        gain: tuple[Atom, ...] = (),
-    ) -> None:
+    def _conjunction(self, formula: Formula, start: Atom, end: Atom, gain: Gain) -> None:
         """Of a conjunction, or one literal, all literals are tested at once."""
         found = known_literals(formula)
         if found is None or any(
-            known.get(atom, value) != value for atom, value in found[0].items()
+            self.known.get(at, value) != value for at, value in found[0].items()
         ):
             return
         literals, forks = found
-        met = {**known, **literals, start: True}
+        met = {**self.known, **literals, start: True}
         if not forks:
-            self.action(name, met, (end, *gain), (start,))
+            self.out.action(self.name, met, (end, *gain), (start,))
             return
         if literals:
-            here = self.phase()
-            self.action(name, met, (here,), (start,))
+            here = self.out.phase()
+            self.out.action(self.name, met, (here,), (start,))
             start = here
-        self._in_turn(name, And(tuple(forks)), start, end, known, gain)
+        self._in_turn(And(tuple(forks)), start, end, gain, None)
 
 
 def known_literals(formula: Formula) -> tuple[dict[Atom, bool], list[Formula]] | None:

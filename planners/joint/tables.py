@@ -55,8 +55,7 @@ def differs(values: Numbers) -> Bools:
 
 def kept_runs(first: Ints, kept: Bools) -> Ints:
     """The bounds of the runs of a CSR table (runs + 1) of whose entries only some are kept."""
-    bounds: Ints = np.concatenate(([0], np.cumsum(kept)))[first]
-    return bounds
+    return np.concatenate(([0], np.cumsum(kept)))[first]
 
 
 def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:

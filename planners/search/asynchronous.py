@@ -11,7 +11,7 @@ and verifies languages in step does so without one (docs/asynchronous.md).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import pairwise, permutations, product
@@ -83,13 +83,15 @@ class _Unfolding:
         self._next = cache(self._not_late)
         self.events: list[dict[Event, int]] = [{} for _ in self._robots]
         self._layers: list[dict[object, _Node]] = [{} for _ in space.layers]
-        self._graph = _Graph()
+        #: State, goal, layer and edges of the nodes of the graph, with the number: those with the
+        #: same edges are one.
+        self._nodes: dict[tuple[int, int, int, _Edges], int] = {}
         self._nothing: _Queues = ((),) * space.robots
 
     def so_far(self) -> str:
         """How far it got, for messages."""
         pasts = sum(map(len, self._layers))
-        return f"{pasts:,} states with their pasts, {len(self._graph):,} nodes of the graph"
+        return f"{pasts:,} states with their pasts, {len(self._nodes):,} nodes of the graph"
 
     def run(self) -> PlanSpace:
         idle = (0,) * len(self._robots)
@@ -116,9 +118,7 @@ class _Unfolding:
             step_model=old,
             has_ties=self._traces.has_ties,
         )
-        return self._graph.space(
-            replace(self._space, model=model), [s.queues[self._nothing] for s in starts]
-        )
+        return self._graph([start.queues[self._nothing] for start in starts], model)
 
     def _node(self, node: int, past: Ints, idles: Step, allowed: tuple[int, ...]) -> _Node:
         past = past * self._waits.matter[node]
@@ -251,7 +251,27 @@ class _Unfolding:
                 if own.setdefault(tuple(said), (target, cost)) != (target, cost):
                     self._refuse_timing(here.node)
         for own_queues, own in moves.items():
-            here.queues[own_queues] = self._graph.node(state, goal, layer, own)
+            key = state, goal, layer, tuple(sorted(own.items()))
+            here.queues[own_queues] = self._nodes.setdefault(key, len(self._nodes))
+
+    def _graph(self, starts: Sequence[int], model: JointModel) -> PlanSpace:
+        """The plan space of what paths from the starts pass through."""
+        columns = np.array([node[:3] for node in self._nodes], np.int64).reshape(-1, 3).T.copy()
+        own = [node[3] for node in self._nodes]
+        edges = [edge for some in own for edge in some]
+        found = replace(
+            self._space,
+            model=model,
+            state=columns[0],
+            goal=columns[1],
+            layer=columns[2],
+            first=np.cumsum([0, *map(len, own)]),
+            target=np.array([target for _, (target, _) in edges], np.int64),
+            labels=np.array([step for step, _ in edges], np.int32).reshape(-1, len(self._robots)),
+            cost=np.array([cost for _, (_, cost) in edges], np.int64),
+            starts=np.array(starts, np.int64),
+        )
+        return found.reduced()
 
 
 class _Waits:
@@ -363,40 +383,6 @@ class Timing:
             numbers = [own.index(event) if event in own else -1 for event in events]
             columns.append(numbers + [0] * (length - len(numbers)))
         return tuple(zip(*columns, strict=True))
-
-
-class _Graph:
-    """A plan space in the making, from the goals up: nodes with the same edges are one."""
-
-    def __init__(self) -> None:
-        #: State, goal, layer and edges, with the number.
-        self._nodes: dict[tuple[int, int, int, _Edges], int] = {}
-
-    def __len__(self) -> int:
-        return len(self._nodes)
-
-    def node(self, state: int, goal: int, layer: int, moves: Mapping[Step, tuple[int, int]]) -> int:
-        """The number of a node with these edges: labels, then target and cost."""
-        key = state, goal, layer, tuple(sorted(moves.items()))
-        return self._nodes.setdefault(key, len(self._nodes))
-
-    def space(self, old: PlanSpace, starts: Sequence[int]) -> PlanSpace:
-        """The plan space of what paths from the starts pass through."""
-        columns = np.array([node[:3] for node in self._nodes], np.int64).reshape(-1, 3).T.copy()
-        own = [node[3] for node in self._nodes]
-        edges = [edge for some in own for edge in some]
-        found = replace(
-            old,
-            state=columns[0],
-            goal=columns[1],
-            layer=columns[2],
-            first=np.cumsum([0, *map(len, own)]),
-            target=np.array([target for _, (target, _) in edges], np.int64),
-            labels=np.array([step for step, _ in edges], np.int32).reshape(-1, old.robots),
-            cost=np.array([cost for _, (_, cost) in edges], np.int64),
-            starts=np.array(starts, np.int64),
-        )
-        return found.reduced()
 
 
 def event_text(model: JointModel, robot: int, event: Event | None) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -54,17 +55,15 @@ class EdgeTrees:
 
     def __init__(self, space: PlanSpace) -> None:
         self._space = space
-        self._trees: dict[int, dict[int, Any]] = {}
+        #: The tree of a node; a label that no edge has, after those before it, is not in it.
+        self.of = cache(self._tree)
 
-    def of(self, node: int) -> dict[int, Any]:
-        """The tree of a node; a label that no edge has, after those before it, is not in it."""
-        tree = self._trees.get(node)
-        if tree is None:
-            tree = self._trees[node] = {}
-            for edge in self._space.out_edges(node):
-                *first, last = self._space.labels_of(edge)
-                at = tree
-                for label in first:
-                    at = at.setdefault(label, {})
-                at[last] = self._space.target_of(edge)
+    def _tree(self, node: int) -> dict[int, Any]:
+        tree: dict[int, Any] = {}
+        for edge in self._space.out_edges(node):
+            *first, last = self._space.labels_of(edge)
+            at = tree
+            for label in first:
+                at = at.setdefault(label, {})
+            at[last] = self._space.target_of(edge)
         return tree
