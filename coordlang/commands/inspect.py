@@ -199,7 +199,7 @@ def inspection(loaded: PlanningInstance) -> Inspected:
         without_effects=tuple(sorted({a.schema for a in model.actions if not a.effects})),
         costs=_costs(domain, model.cost),
         interfering=model.stepper.interfering_pairs(),
-        example=model.stepper.conflict_in(model.codec.facts_part(rows)),
+        example=next((s for _, s in model.stepper.conflicts(model.codec.facts_part(rows))), None),
         fluents=fluents,
         start=_counted(model.codec.facts.atoms[fact].predicate for fact in start),
         statics=statics,

@@ -368,28 +368,24 @@ def validate(
     team: Team,
     plan: Sequence[Labels],
     *,
-    init: Iterable[Atom] | None = None,
-    goal: Formula | None = None,
     joint_actions: Sequence[str] | None = None,
 ) -> Verdict:
     """Check that every step is legal where it is taken and that the goal holds at the end.
 
     ``plan[k][i]`` is the subaction of robot ``i`` in step ``k``, such as ``"(move r1 a b)"`` (in
     joint-action PDDL the filled-in template of the subaction comment), or None if it idles.
-    ``init`` (true fluents; statics come from the problem) and ``goal`` are of another task than the
-    problem's own.  ``joint_actions`` names the one of each step; None: any with its subactions.
+    ``joint_actions`` names the one of each step; None: any with its subactions.
 
     Raises `BadInput` where two applicable joint actions with the same subactions have different
     results.
     """
     rules = Rules(domain, problem, team)
-    state = rules.meaning.fluents_of(problem.init if init is None else init)
+    state = rules.meaning.fluents_of(problem.init)
     for number, labels in enumerate(plan):
         after = rules.step(state, labels, joint_actions[number] if joint_actions else None)
         if isinstance(after, str):
             return Verdict(False, number, after)
         state = after
-    wanted = problem.goal if goal is None else goal
-    if why := rules.meaning.fails(wanted, {}, Moment(state)):
+    if why := rules.meaning.fails(problem.goal, {}, Moment(state)):
         return Verdict(False, len(plan), f"the goal does not hold at the end: {why}")
     return Verdict(True, None, "every step is a joint step and the goal holds at the end")

@@ -62,10 +62,7 @@ class Writer:
             raise TooManyError
 
     def end(self, wanted: Formula, known: Known) -> Atom | None:
-        """Let the goal be what is ``known`` and literals; else a fact to be made true, which it is.
-
-        ``wanted`` is what the plans of the model end with.
-        """
+        """Let the goal be ``known`` and ``wanted`` if literals say that, else the fact returned."""
         found = known_literals(wanted)
         if found and not found[1]:
             self.goal = self.conditions({**known, **found[0]})

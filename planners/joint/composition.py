@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from itertools import combinations, pairwise, product
 from math import prod
 
@@ -143,23 +143,9 @@ class ComposingStepper(Stepper):
         """See `Stepper`."""
         return sum(int(np.count_nonzero(~table[1:, 1:])) for table in self.tables.values())
 
-    def conflict_in(self, rows: Rows) -> str | None:
+    def conflicts(self, rows: Rows) -> Iterator[tuple[object, str]]:
         """See `Stepper`."""
-        return next((why for pair in self._clashing(rows) if (why := self._conflict(pair))), None)
-
-    def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
-        """See `Stepper`."""
-        counted = Counter(self._clashing(rows)).most_common()
-        return next(((why, n) for pair, n in counted if (why := self._conflict(pair))), None)
-
-    def _conflict(self, pair: tuple[int, int, int, int]) -> str | None:
-        i, j, mine, theirs = pair
-        first, second = self.labelled[i][mine], self.labelled[j][theirs]
-        return conflict(first, second) if first and second else None
-
-    def _clashing(self, rows: Rows) -> Iterator[tuple[int, int, int, int]]:
-        """State by state two robots and labels of theirs, each possible, that may not meet."""
-        options = self.choices(rows)
+        options, why = self.choices(rows), cache(self._conflict)
         robots = range(len(self._robots))
         for state, (i, j) in product(range(len(rows)), combinations(robots, 2)):
             mine, theirs = (
@@ -167,7 +153,13 @@ class ComposingStepper(Stepper):
                 for first, labels in (options[i], options[j])
             )
             for a, b in np.argwhere(~self.tables[i, j][np.ix_(mine, theirs)]).tolist():
-                yield i, j, int(mine[a]), int(theirs[b])
+                pair = i, j, int(mine[a]), int(theirs[b])
+                if text := why(*pair):
+                    yield pair, text
+
+    def _conflict(self, i: int, j: int, mine: int, theirs: int) -> str | None:
+        first, second = self.labelled[i][mine], self.labelled[j][theirs]
+        return conflict(first, second) if first and second else None
 
     def _compose(
         self, rows: Rows, options: Options, waits: Sequence[Bools], span: slice

@@ -9,7 +9,7 @@ applicable, a whole table of states at a time.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -133,13 +133,9 @@ class Stepper(ABC):
         """How many pairs of subactions of different robots may not share a step."""
         return 0
 
-    def conflict_in(self, rows: Rows) -> str | None:
-        """Why two subactions that are both possible in one of these states interfere, in words."""
-        return None
-
-    def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
-        """The `conflict_in` that is met in most of these states, and in how many."""
-        return None
+    def conflicts(self, rows: Rows) -> Iterator[tuple[object, str]]:
+        """State by state pairs of subactions that are both possible and interfere, and why."""
+        return iter(())
 
 
 @dataclass(frozen=True, slots=True)

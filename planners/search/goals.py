@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -94,10 +95,10 @@ def searched(model: JointModel, goal: Goal, seen: Rows, left_out: int = 0) -> st
     if lacking:
         return "\n  ".join((said, *lacking))
     looked_at = model.codec.facts_part(seen[:: len(seen) // _LOOK_AT + 1])
-    found = model.stepper.frequent_conflict(looked_at)
-    if found is None:
+    conflicts = Counter(model.stepper.conflicts(looked_at))
+    if not conflicts:
         return said
-    why, states = found
+    [((_, why), states)] = conflicts.most_common(1)
     return (
         f"{said}\n  Of pairs of actions that cannot share a step, the one met most often "
         f"({states:,} of {len(looked_at):,} states looked at): {why}."

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from itertools import permutations
 from random import Random
 
@@ -20,6 +21,7 @@ from planners.check.rules import validate
 from planners.joint.model import PlanningTask
 from planners.joint.tables import Rows
 from planners.pddl.model_options import ModelOptions
+from planners.pddl.robots import static_atoms
 from planners.search.heuristics import HEURISTICS
 from planners.search.optimal_plans import search
 from planners.search.plan_file import NotAPlan
@@ -105,7 +107,8 @@ def judged(
     said: tuple[Texts, ...] = texts(model, plan)
     problem = loaded.problems[0]
     init, goal = ground_task(loaded.domain, problem, candidates.listed[0])
-    verdict = validate(loaded.domain, problem, loaded.team, said, init=init, goal=goal)
+    asked = replace(problem, init=init | static_atoms(loaded.domain, problem), goal=goal)
+    verdict = validate(loaded.domain, asked, loaded.team, said)
     if not verdict.valid:
         with pytest.raises(NotAPlan) as wrong:
             sentence_of_plan(task_language, said)
@@ -161,7 +164,8 @@ def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str,
                 assert found.states <= found.expanded < found.generated + 1
                 searches += 1
             steps = texts(task_language.model, found.plan)
-            verdict = validate(loaded.domain, problem, loaded.team, steps, init=init, goal=goal)
+            asked = replace(problem, init=init | static_atoms(loaded.domain, problem), goal=goal)
+            verdict = validate(loaded.domain, asked, loaded.team, steps)
             assert verdict.valid, verdict.reason
     return searches
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 
 from planners.check.rules import Labels, Rules, Verdict, validate
-from planners.pddl.lifted import And, Atom, Domain, Not, Problem
+from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions, Unowned
 from planners.pddl.robots import Team, find_team
 from planners.system.errors import BadInput
@@ -89,16 +89,6 @@ def test_plans_that_are_none(plan: list[Labels], step: int, words: tuple[str, ..
     verdict = validate(*ROOMS, plan)
     assert (verdict.valid, verdict.step) == (False, step)
     assert all(word in verdict.reason for word in words), verdict
-
-
-def test_another_task_brings_its_fluents_and_its_goal() -> None:
-    init = [Atom("at", ("r1", "c")), Atom("at", ("r2", "c"))]
-    goal = And((Atom("at", ("r1", "b")), Not(Atom("at", ("r2", "b")))))
-    assert validate(*ROOMS, [["(move r1 c b)", None]], init=init, goal=goal).valid
-    broken = validate(*ROOMS, [["(move r1 a b)", None]], init=init, goal=goal)
-    assert (broken.step, "(at r1 a) is false" in broken.reason) == (0, True)
-    empty = validate(*ROOMS, [], goal=Atom("at", ("r2", "b")))
-    assert empty == Verdict(True, None, empty.reason)
 
 
 # -- action formulas, owners, quantifiers
