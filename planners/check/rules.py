@@ -235,23 +235,22 @@ class Rules:
         if key in self._touched:
             return self._touched[key]
         pair = frozenset((action.name, other.name)) if other else None
-        needs: set[Literal] = set()
         own = self.meaning.required(action.schema.precondition, action.binding, True, action.owners)
-        if not isinstance(own, bool):
-            needs |= own
+        needs = [own]
         changes: dict[bool, set[Atom]] = {True: set(), False: set()}
         for effect in action.schema.effects:
             for binding in self.meaning.bindings(effect.variables, action.binding):
                 required = self.meaning.required(effect.condition, binding, True, ())
                 fires = self.meaning.holds(effect.condition, binding, True, Moment(None, pair))
                 if required is not False and fires:
-                    needs |= required if required is not True else frozenset()
+                    needs.append(required)
                     changes[effect.adds].add(ground_atom(effect.atom, binding))
-        touched = Touched(
-            frozenset(needs), frozenset(changes[True]), frozenset(changes[False] - changes[True])
+        literals = frozenset[Literal]().union(
+            *(part for part in needs if not isinstance(part, bool))
         )
-        self._touched[key] = touched
-        return touched
+        adds, deletes = frozenset(changes[True]), frozenset(changes[False] - changes[True])
+        self._touched[key] = Touched(literals, adds, deletes)
+        return self._touched[key]
 
     def _after(self, state: State, actions: Iterable[Instance]) -> State:
         """All effects together; an atom that is both added and deleted becomes true."""

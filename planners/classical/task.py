@@ -174,10 +174,9 @@ def to_pddl(classical: ClassicalTask, *, costs: bool = True) -> tuple[str, str]:
 
 
 def _requirements(classical: ClassicalTask, costs: bool) -> str:
-    conditions = (c for action in classical.actions for c in action.preconditions)
-    negative = any(not positive for _, positive in (*classical.goal, *conditions))
-    names = [":strips"]
-    names += [":negative-preconditions"] if negative or costs else []
+    conditions = (classical.goal, *(action.preconditions for action in classical.actions))
+    negative = costs or any(not positive for own in conditions for _, positive in own)
+    names = [":strips", *([":negative-preconditions"] if negative else [])]
     return " ".join(names + ([":action-costs"] if costs else []))
 
 

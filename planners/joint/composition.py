@@ -51,8 +51,7 @@ class ComposingStepper(Stepper):
         known = [Choices(own) for own in self.labelled]
         self.tables = {
             (i, j): compatible(known[i], known[j], i, j)
-            for j in range(len(robots))
-            for i in range(j)
+            for i, j in combinations(range(len(robots)), 2)
         }
         #: Pairs of robots some of whose labels may not meet.
         self._apart = {pair for pair, table in self.tables.items() if not table.all()}

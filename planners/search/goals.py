@@ -12,7 +12,6 @@ from planners.joint.conditions import split_condition, split_effects
 from planners.joint.model import FullState, Goal, JointModel, show
 from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import required_atoms
-from planners.pddl.lifted import Formula
 
 #: What to try besides a larger limit.
 SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
@@ -51,15 +50,14 @@ class FactsOf(NamedTuple):
         """Those of an action; facts that are never true are left out."""
         adds, deletes, conditional = split_effects(action, model.codec.facts)
         index, evaluator = model.codec.facts.index, model.evaluator
-
-        def needs(condition: Formula) -> frozenset[int]:
-            return split_condition(condition, evaluator)[0]
-
         return cls(
-            needs(action.precondition),
+            split_condition(action.precondition, evaluator)[0],
             frozenset(adds),
             frozenset(deletes).difference(adds),
-            tuple((needs(e.condition), index[e.atom], e.adds) for e in conditional),
+            tuple(
+                (split_condition(e.condition, evaluator)[0], index[e.atom], e.adds)
+                for e in conditional
+            ),
         )
 
     @property

@@ -39,11 +39,7 @@ CHOICES = ("auto", *HEURISTICS)
 def heuristic(bound: Bound, model: JointModel, goal: Goal, init: Rows) -> Values:
     """The bound for the states reachable from one; 0 exactly in goal states."""
     least = bound(model, goal, state_variables(model, init))
-
-    def value(rows: Rows) -> Ints:
-        return np.maximum(least(rows), ~model.holds(goal, rows))
-
-    return value
+    return lambda rows: np.maximum(least(rows), ~model.holds(goal, rows))
 
 
 class Heuristic(NamedTuple):
