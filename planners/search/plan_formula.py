@@ -237,8 +237,7 @@ def mutexes(model: JointModel, init: Rows, block: int = _BLOCK) -> list[tuple[in
         csgraph()  # scipy is loaded only where it fits
     except OutOfMemory:
         return []
-    assert isinstance(model.stepper, ComposingStepper)
-    facts, ways = len(model.codec.facts), list(_ways(model, model.stepper))
+    facts, ways = len(model.codec.facts), list(_ways(model))
     if len(ways) > _MOST or not facts:
         return []
     true = model.codec.true_facts(model.codec.facts_part(init))
@@ -248,7 +247,7 @@ def mutexes(model: JointModel, init: Rows, block: int = _BLOCK) -> list[tuple[in
     staying = [frozenset((fact,)) for fact in range(facts)]
     needs = _table([*(way.needs for way in ways), *staying], facts)
     adds = _table([*(way.adds for way in ways), *staying], facts)
-    together = _together(model.stepper, ways, facts)
+    together = _together(model, ways)
     before = -1
     while (count := int(may.sum())) != before:  # pairs that may be true are added
         before = count
@@ -280,9 +279,10 @@ class _Way(NamedTuple):
     deletes: frozenset[int]
 
 
-def _ways(model: JointModel, stepper: ComposingStepper) -> Iterator[_Way]:
+def _ways(model: JointModel) -> Iterator[_Way]:
     """Labels' effects under one condition each."""
-    for robot, own in enumerate(stepper.labelled):
+    assert isinstance(model.stepper, ComposingStepper)
+    for robot, own in enumerate(model.stepper.labelled):
         for label, action in enumerate(own):
             if action is not None:
                 read = FactsOf.of(model, action)
@@ -290,14 +290,15 @@ def _ways(model: JointModel, stepper: ComposingStepper) -> Iterator[_Way]:
                     yield _Way(robot, label, needs, adds, read.deletes)
 
 
-def _together(stepper: ComposingStepper, ways: Sequence[_Way], facts: int) -> Bools:
+def _together(model: JointModel, ways: Sequence[_Way]) -> Bools:
     """Which ways may share a step: (ways of labels, all ways)."""
+    assert isinstance(model.stepper, ComposingStepper)
     robot, label = (np.array([way[k] for way in ways], np.int64) for k in range(2))
     fits = (robot[:, None] == robot) & (label[:, None] == label)
-    for (i, j), table in stepper.tables.items():
+    for (i, j), table in model.stepper.tables.items():
         mine, theirs = np.flatnonzero(robot == i), np.flatnonzero(robot == j)
         fits[np.ix_(mine, theirs)] = table[np.ix_(label[mine], label[theirs])]
-    deletes = _table([way.deletes for way in ways], facts)
+    deletes = _table([way.deletes for way in ways], len(model.codec.facts))
     return np.hstack((fits | fits.T, deletes.toarray() == 0))
 
 
