@@ -380,8 +380,10 @@ class MinimalSearch:
         return None
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
-        """The best language, with what is proved."""
-        assert self.best is not None
+        """The best language, with what is proved.  Raises ``stopped`` if there is none."""
+        if self.best is None:
+            assert stopped is not None
+            raise stopped
         figures: dict[str, float] = {}
         refuting, languages = self.refuting, self.__dict__.get("languages")
         if languages is not None:

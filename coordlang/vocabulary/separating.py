@@ -44,6 +44,9 @@ def separating(job: Job) -> Outcome:
     search = _Search(job)
     with closing(search.problems):
         stopped = run_until_stopped(search.run)
+    if search.best is None:
+        assert stopped is not None
+        raise stopped
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
 
 
@@ -56,9 +59,9 @@ class _Search:
     """
 
     def __init__(self, job: Job) -> None:
-        assert job.incumbent is not None
-        self._job, self.best = job, job.incumbent
+        self._job = job
         self.lower = job.lower_bound
+        self.best: Assignment | None = job.incumbent
         #: The constraints that are known, as a set, too, and states that need words of their own.
         self._known: list[Constraint] = []
         self._met: set[Constraint] = set()
@@ -74,7 +77,7 @@ class _Search:
     @property
     def upper(self) -> int:
         """The number of words known to suffice."""
-        return word_count(self.best)
+        return len(self._job.states) + 1 if self.best is None else word_count(self.best)
 
     def run(self) -> None:
         if not self._job.first_differences.requiring:
