@@ -89,7 +89,7 @@ def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST)
         mixtures = walk_mixtures(task_language, fits, subplans, words, most)
     # Without a common step a node is no state in which a robot is when it has done its events.
     space = mixtures.space if mixtures and not model.is_asynchronous else None
-    facts = [*map(model.codec.fact_bits, fits.rows)]
+    facts = [*map(model.codec.fact_bits, fits.rows)] if space else []
     truth = [facts[state] for state in space.state.tolist()] if space else []
     robots = []
     for robot in range(len(subplans)):

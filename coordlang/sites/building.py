@@ -277,11 +277,13 @@ def _set_image_scales(levels: Sequence[_Level], named: Value | None) -> tuple[st
     unscaled = []
     for level in levels:
         size, scale = _size(level.fiducials(), marks), level.measured()
-        if known and size:
+        if known is not None and size is not None:
             scale = known / size
-        if not scale and level.used:
-            unscaled.append(level.name)
-        level.set_scale(scale or 1.0, scale or 1.0)
+        if scale is None:
+            if level.used:
+                unscaled.append(level.name)
+            scale = 1.0
+        level.set_scale(scale, scale)
     return tuple(unscaled)
 
 

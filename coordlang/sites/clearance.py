@@ -63,6 +63,8 @@ def excluded(building: Building, clearance: float) -> list[tuple[Motion, Motion]
     What the rules for every pair of robots forbid is left out: sharing a place, and swapping.
     """
     driving = _driving(building)
+    if not driving or (clearance <= 0 and not any(motion.groups for motion in driving)):
+        return []
     motions = [*driving, *(motion(place, place) for place in building.places.values())]
     near = np.triu(_near(motions, clearance), 1)[: len(driving)]
     pairs = [(motions[first], motions[second]) for first, second in np.argwhere(near).tolist()]
@@ -76,7 +78,10 @@ def _is_ruled_out(one: Motion, other: Motion) -> bool:
 
 def _near(motions: Sequence[Motion], clearance: float) -> Bools:
     """Which motions may clash with which: they have a group in common, or their boxes are near."""
-    near = np.array([[bool(a.groups & b.groups) for b in motions] for a in motions])
+    near = np.zeros((len(motions), len(motions)), np.bool_)
+    for group in frozenset[str]().union(*(motion.groups for motion in motions)):
+        inside = [group in motion.groups for motion in motions]
+        near |= np.outer(inside, inside)
     for level in {level for motion in motions for level in motion.on}:
         there = [number for number, motion in enumerate(motions) if level in motion.on]
         ends = np.array([motions[number].on[level] for number in there])

@@ -57,7 +57,7 @@ def selectors_of(model: JointModel) -> Selectors:
     if model.is_joint_action:
         nothing = (frozenset[int](),) * len(actions)
         return Selectors(("team",), (None,), _one_of_each(actions), nothing)
-    idling, apart = tuple(model.idling_costs), clashes(model.actions)
+    idling, apart = tuple(model.idling_costs), clashes(model.actions, actions)
     return Selectors(model.robots, idling, tuple(actions), apart)
 
 
@@ -95,13 +95,15 @@ _Literal = tuple[Atom, bool]
 _Pairs = set[frozenset[int]]
 
 
-def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
+def clashes(
+    actions: Sequence[GroundAction], on_facts: Sequence[GroundAction]
+) -> tuple[frozenset[int], ...]:
     """For each action the others that cannot share a joint step with it (docs/pddl.md).
 
     In terms of literals ``(atom, value)``: two actions interfere when one writes the contrary of
     what the other writes or reads; the latter is forgiven when a positive formula links them.
-    Besides, a formula may forbid the other.  Effects that cannot happen with just the two in the
-    step neither write nor read.
+    Besides, a formula may forbid the other, perhaps only ``on_facts``, where it lacks what is never
+    true.  Effects that cannot happen with just the two in the step neither write nor read.
     """
     linked = _naming(actions, _partners)
     # The condition of an effect of one names the other: what can happen depends on both.
@@ -111,7 +113,7 @@ def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
     for pair in special:
         two = [actions[number] for number in pair]
         pairs |= _contrary({n: _with_effects(actions[n], *two) for n in pair}, linked)
-    pairs |= _naming(actions, lambda a: forbidden_steps(a.precondition))
+    pairs |= _naming(on_facts, lambda a: forbidden_steps(a.precondition))
     found: list[set[int]] = [set() for _ in actions]
     for pair in pairs:
         for number in pair:

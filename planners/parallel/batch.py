@@ -149,8 +149,9 @@ class Store:
                 why = "is no file"
             elif found.st_size <= self._largest:
                 data = path.read_bytes()
-                with suppress(OSError):  # a folder that is only read
-                    os.utime(path)  # it was used now
+                if self.most_bytes is not None:
+                    with suppress(OSError):  # a folder that is only read
+                        os.utime(path)  # it was used now
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
-from functools import reduce
 from operator import or_
 from pathlib import Path
 from typing import Any, TypeVar
@@ -145,7 +144,7 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
         functions=_merged((domain.functions for domain in domains), _signatures),
         schemas=tuple(schemas.values()),
         constraints=_join_constraints(domains),
-        dependences=reduce(_both, (domain.dependences for domain in domains)),
+        dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
     )
 
 

@@ -68,9 +68,25 @@ ANYWAY = """
 """
 ANYWAY_TASK = """(define (problem p) (:domain anyway) (:objects r1 r2 - robot) (:init)
   (:goal (or (and (done r1) (or (done r2) (warm))) (warm) (and (done r2) (warm)))))"""
+#: What forbids another action is a disjunction, but for what is never true.
+GATE = """
+(define (domain gate) (:types robot gate)
+  (:constants a b - gate)
+  (:predicates (in ?r - robot) (wide ?g - gate))
+  (:action widen :agent ?r - robot :parameters (?g - gate) :precondition (= ?g a) :effect (wide ?g))
+  (:action enter :agent ?r - robot :parameters ()
+    :precondition (forall (?o - robot) (or (= ?o ?r) (not (enter ?o)) (wide b))) :effect (in ?r)))
+"""
+GATE_TASK = """(define (problem p) (:domain gate) (:objects r1 r2 - robot) (:init)
+  (:goal (and (in r1) (in r2))))"""
 #: Makespans and numbers of actions of `MODELS`.
 LEAST = [(3, 3), (2, 2), (6, 6), (6, 11), (2, 3), (1, 2), (2, 2), (3, 3), (1, 3)]
-TEXTS = {**MODELS, "twice": (TWICE, TWICE_TASK), "anyway": (ANYWAY, ANYWAY_TASK)}
+TEXTS = {
+    **MODELS,
+    "twice": (TWICE, TWICE_TASK),
+    "anyway": (ANYWAY, ANYWAY_TASK),
+    "gate": (GATE, GATE_TASK),
+}
 
 
 def every_plan_once(model: JointModel, task: PlanningTask) -> tuple[tuple[int, int] | None, int]:
