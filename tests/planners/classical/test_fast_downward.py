@@ -119,7 +119,7 @@ def test_a_wrong_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = read(*MODELS["tool"])
     assert search(loaded.model, loaded.tasks[0]).cost_of(0) == (3, 0)
     monkeypatch.setattr(
-        plain_module.selectors, "clashes", lambda actions: (frozenset(),) * len(actions)
+        plain_module.selectors, "clashes", lambda actions, _: (frozenset(),) * len(actions)
     )
     in_form = partial(compile_classical, limit=0)
     monkeypatch.setattr(fast_downward, "compile_classical", in_form)
