@@ -226,20 +226,22 @@ def read_objects(
 
     A section is a typed list, with ``(:private ..)`` groups.
     """
-    objects, private = {**known}, list[Group]()
+    objects, parts = {**known}, list[tuple[list[Typed], list[Group]]]()
     for section in sections:
-        own = [i for i in section.items if isinstance(i, Group) and i.head == ":private"]
-        _declare(names, objects, [i for i in section.items[1:] if i not in own])
-        private += own
-    for group in private:
-        _declare(names, objects, _without_owner(group, objects))
+        private = [i for i in section.items if isinstance(i, Group) and i.head == ":private"]
+        own = [item for item in section.items[1:] if item not in private]
+        parts.append((typed_list(own, "an object"), private))
+    declared = {*known, *(token.text for own, _ in parts for token, _ in own)}
+    for entries, private in parts:
+        _declare(names, objects, entries)
+        for group in private:
+            inner = _without_owner(group, declared | objects.keys())
+            _declare(names, objects, typed_list(inner, "an object"))
     return objects
 
 
-def _declare(
-    names: Names, objects: dict[str, tuple[str, ...]], items: Sequence[Expression]
-) -> None:
-    for token, types in typed_list(items, "an object"):
+def _declare(names: Names, objects: dict[str, tuple[str, ...]], entries: Iterable[Typed]) -> None:
+    for token, types in entries:
         names.check_types(token, types)
         if token.text.startswith("?"):
             remedy = f"Names of objects have no '?': {visible(token.text[1:_SHOWN])}."
