@@ -174,17 +174,15 @@ def answered(classical: ClassicalTask, directory: Path, code: int) -> int | None
     if code:
         raise _crash(code, (directory / "log").read_text(errors="replace"))
     plan = directory / "plan"
-    text = plan.read_text() if plan.exists() else ""
-    actions, _, last = text.strip().rpartition("\n")
+    *actions, last = (plan.read_text() if plan.exists() else "").splitlines() or [""]
     cost = _COST.fullmatch(last)
     if cost is None:
         raise FastDownwardFailed("the plan of Fast Downward is not complete", remedy=_FULL)
     number = {f"({name} )": n for n, name in enumerate(action_names(classical))}
-    found = [number.get(line, -1) for line in actions.splitlines()]
-    total = classical.cost_of_plan(found)
+    total = classical.cost_of_plan([number.get(line, -1) for line in actions])
     if total is None or (total != int(cost[1]) and total <= _GREATEST):
         raise FastDownwardFailed(
-            f"Fast Downward wrote {len(found)} actions that are no plan of its task", remedy=_FULL
+            f"Fast Downward wrote {len(actions)} actions that are no plan of its task", remedy=_FULL
         )
     return total
 

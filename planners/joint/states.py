@@ -173,9 +173,11 @@ class StateCodec:
         robot, _, name = atom[len("(last ") : -1].partition(" ")
         if robot in self.robots:
             position = self.robots.index(robot)
-            names = ("none", *self.memory[position])
-            if name in names:
-                row[self.fact_blocks + position] = np.uint64(names.index(name))
+            if name == "none":
+                return
+            if name in self.memory[position]:
+                number = self.memory[position].index(name) + 1
+                row[self.fact_blocks + position] = np.uint64(number)
                 return
         raise BadInput(
             f"{atom} names no robot's subaction of this model",
