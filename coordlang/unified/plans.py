@@ -43,7 +43,7 @@ class NoSteps(Exception):
 def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: Any) -> Any:
     """A joint plan as a unified-planning plan of ``kind`` (a `PlanKind`)."""
     steps: list[list[Any]] = [[] for _ in plan]
-    for number, text in numbered_actions(plans, plan):
+    for number, text in numbered_actions(plans, plan, plans.steps(plan)):
         steps[number].append(_instance(found, text))
     if kind == up.PlanKind.SEQUENTIAL_PLAN:
         return up.SequentialPlan([*chain(*steps)], environment)

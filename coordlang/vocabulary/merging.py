@@ -45,12 +45,12 @@ def merged(
     merges, steps = 1, _STEPS
     while True:
         pair = _next_merge(word[mine], closed)
-        trial, of_trial = _merged_often(word, closed, mine, merges)
         if pair is None:
             if not left:
                 return
             closed, left, steps = forbidden_merges(pool, word, {}), False, 2 * steps
             continue
+        trial, of_trial = _merged_often(word, closed, pair, mine, merges)
         known = {shape: own.shape[2] for shape, own in pool.by_shape.items()}
         try:
             holds = not languages.agreeing(trial, None, 1, steps)
@@ -102,12 +102,15 @@ def _forbid(forbidden: Bools, said: Ints) -> None:
         forbidden[into[agree], gone[agree]] = forbidden[gone[agree], into[agree]] = True
 
 
-def _merged_often(word: Ints, forbidden: Bools, mine: Ints, merges: int) -> tuple[Ints, Bools]:
-    """The words, and what is forbidden, after so many merges, or as many as there are."""
-    for _ in range(merges):
-        if (pair := _next_merge(word[mine], forbidden)) is None:
+def _merged_often(
+    word: Ints, forbidden: Bools, pair: tuple[int, int], mine: Ints, merges: int
+) -> tuple[Ints, Bools]:
+    """The words, and what is forbidden, after a merge and more, so many or as many as there are."""
+    word, forbidden = _merge(word, forbidden, pair)
+    for _ in range(merges - 1):
+        if (further := _next_merge(word[mine], forbidden)) is None:
             break
-        word, forbidden = _merge(word, forbidden, pair)
+        word, forbidden = _merge(word, forbidden, further)
     return word, forbidden
 
 

@@ -38,24 +38,28 @@ def _joint_steps(team: Selectors, limit: int) -> list[tuple[int, ...]]:
         raise TooManyError
     partial: list[tuple[int, ...]] = [()]
     for robot in range(len(team.names)):
+        first = [n for n, action in enumerate(team.actions) if action.owners[0] == robot]
         grown: list[tuple[int, ...]] = []
         for step in partial:
-            grown += _with_choices(team, step, robot)
+            grown += _with_choices(team, step, robot, first)
             if len(grown) > limit:
                 raise TooManyError
         partial = grown
     return partial
 
 
-def _with_choices(team: Selectors, step: tuple[int, ...], robot: int) -> Iterator[tuple[int, ...]]:
-    """A set of actions of the robots before, with what this one may choose first."""
+def _with_choices(
+    team: Selectors, step: tuple[int, ...], robot: int, first: Sequence[int]
+) -> Iterator[tuple[int, ...]]:
+    """A set of actions of the robots before, with what this one may choose ``first``."""
     taken = {owner for number in step for owner in team.actions[number].owners}
     if robot in taken or team.idling[robot] is not None:
         yield step
-    for number, action in enumerate(team.actions):
-        is_free = action.owners[0] == robot and taken.isdisjoint(action.owners)
-        if is_free and team.clashes[number].isdisjoint(step):
-            yield (*step, number)
+    if robot not in taken:
+        for number in first:
+            is_free = taken.isdisjoint(team.actions[number].owners)
+            if is_free and team.clashes[number].isdisjoint(step):
+                yield (*step, number)
 
 
 def _parts(team: Selectors, step: Sequence[int]) -> Sequence[str | None]:

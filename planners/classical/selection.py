@@ -61,9 +61,8 @@ class StagedAction:
             adds, deletes = by_condition.setdefault(condition, (set(), set()))
             (adds if effect.adds else deletes).add(effect.atom)
         by_condition.pop(FALSE, None)
-        self.may_add, self.may_delete = (
-            set[Atom]().union(*of) for of in zip(*by_condition.values(), strict=True)
-        )
+        self.may_add = set[Atom]().union(*(adds for adds, _ in by_condition.values()))
+        self.may_delete = set[Atom]().union(*(deletes for _, deletes in by_condition.values()))
         self.adds, self.deletes = by_condition.pop(TRUE)
         self.groups = list(by_condition.items())
 

@@ -162,7 +162,7 @@ class _Unfolding:
         """
         first, second = self._labels[edge], self._labels[after]
         idle = {robot for robot in self._robots if second[robot] and not first[robot]}
-        for group in self._traces.groups(second):
+        for group in self._traces.groups(second) if idle else ():
             if not idle.isdisjoint(group):
                 own = alone(group, second)
                 before, facts = self._met_by(first, own)

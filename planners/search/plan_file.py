@@ -109,11 +109,12 @@ def to_ipc(plans: Plans, plan: Plan) -> str:
     Joint-action PDDL: one ``(action args)`` a line.  Otherwise one subaction a line with its step,
     ``0: (move r1 a b)``, idling left out, a shared subaction once.  Then ``; makespan = 3``.
     """
+    steps = plans.steps(plan)
     lines = [
         text if plans.space.model.is_joint_action else f"{number}: {text}"
-        for number, text in numbered_actions(plans, plan)
+        for number, text in numbered_actions(plans, plan, steps)
     ]
-    return "\n".join([*lines, f"; makespan = {len(plans.steps(plan))}"]) + "\n"
+    return "\n".join([*lines, f"; makespan = {len(steps)}"]) + "\n"
 
 
 def to_plansys2(plans: Plans, plan: Plan) -> str:
@@ -122,14 +123,17 @@ def to_plansys2(plans: Plans, plan: Plan) -> str:
     The time is the joint step, and each action lasts one step.  Lines before one with "Solution
     Found" are skipped by its readers.
     """
-    actions = numbered_actions(plans, plan)
+    actions = numbered_actions(plans, plan, plans.steps(plan))
     lines = [f"{number}.000: {text}  [1.000]" for number, text in actions]
     return "\n".join([";;;; Solution Found", *lines]) + "\n"
 
 
-def numbered_actions(plans: Plans, plan: Plan) -> Iterator[tuple[int, str]]:
-    """The actions of a plan, each with its joint step: joint actions, or robots' subactions."""
-    model, rows, steps = plans.space.model.in_step, plans.space.rows, plans.steps(plan)
+def numbered_actions(plans: Plans, plan: Plan, steps: Plan) -> Iterator[tuple[int, str]]:
+    """The actions of a plan, each with its joint step: joint actions, or robots' subactions.
+
+    ``steps`` are its `Plans.steps`.
+    """
+    model, rows = plans.space.model.in_step, plans.space.rows
     for number, (state, labels) in enumerate(zip(plans.states(plan), steps, strict=False)):
         whole = model.joint_action(rows[state], labels)
         own = model.texts(labels) if whole is None else (whole,)
