@@ -83,7 +83,8 @@ def _parameter(record: type[Any], name: str, word: str) -> inspect.Parameter:
     """
     if word.endswith("..."):
         return inspect.Parameter(name, inspect.Parameter.VAR_POSITIONAL)
-    is_needed = word in ("LANGUAGE", "LIFTED") and not record.alone
+    first = record.takes.split()[0].strip("[]")
+    is_needed = word == first != "DOMAIN" and not record.alone
     default = inspect.Parameter.empty if is_needed else None
     return inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=default)
 
