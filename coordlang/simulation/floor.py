@@ -39,7 +39,8 @@ class Floor:
     def __init__(self, world: World, known: Mapping[str, Point]) -> None:
         links = [link.ends for link in world.links]
         points = _points(world.places, links, known)
-        top, left = max(y for _, y in points.values()), min(x for x, _ in points.values())
+        top = max((y for _, y in points.values()), default=0.0)
+        left = min((x for x, _ in points.values()), default=0.0)
         self.points = {name: (x - left, top - y) for name, (x, y) in points.items()}
         self.walls = _walls(points, links)
         moves = (link.ends for link in world.links if link.moves)

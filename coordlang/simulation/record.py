@@ -221,6 +221,7 @@ def _wrong(record: SimulationRecord, run: RunRecord) -> str | None:
     named = {step.robot for step in run.steps}.union(*(event.robots for event in run.events))
     if not named <= {*record.robots}:
         return "it speaks of robots that are not listed"
-    if any(max(abs(x), abs(y)) >= _LARGEST for x, y, _ in chain(*run.poses.values())):
+    poses = chain(*run.poses.values())
+    if not all(abs(x) < _LARGEST and abs(y) < _LARGEST for x, y, _ in poses):  # nor NaN
         return f"poses lie between {-_LARGEST:g} and {_LARGEST:g}"
     return None
