@@ -52,35 +52,27 @@ def fold(
     return leaf(formula)
 
 
-def literals(formula: Formula) -> tuple[tuple[Atom | StepAtom | Equal, bool], ...]:
+def literals(
+    formula: Formula, positive: bool = True
+) -> tuple[tuple[Atom | StepAtom | Equal, bool], ...]:
     """List the literals of the formula's negation normal form, from left to right.
 
     A literal is a leaf and whether it is positive; quantified variables stay in it.
     """
-    found: list[tuple[Atom | StepAtom | Equal, bool]] = []
-    _collect(formula, True, found)
-    return tuple(found)
+    # Every ground action is taken apart so, hence no `fold`.
+    if isinstance(formula, Junction):
+        return tuple([found for part in formula.parts for found in literals(part, positive)])
+    if isinstance(formula, Not):
+        return literals(formula.part, not positive)
+    if isinstance(formula, Quantified):
+        return literals(formula.part, positive)
+    return () if isinstance(formula, Truth) else ((formula, positive),)
 
 
 def step_atoms(schema: Schema) -> Iterator[StepAtom]:
     """The actions of the same joint step that an action's formulas speak of."""
     for formula in (schema.precondition, *(e.condition for e in schema.effects)):
         yield from (leaf for leaf, _ in literals(formula) if isinstance(leaf, StepAtom))
-
-
-def _collect(
-    formula: Formula, positive: bool, found: list[tuple[Atom | StepAtom | Equal, bool]]
-) -> None:
-    """Append the literals; every ground action is taken apart so, hence no `fold`."""
-    if isinstance(formula, Junction):
-        for part in formula.parts:
-            _collect(part, positive, found)
-    elif isinstance(formula, Not):
-        _collect(formula.part, not positive, found)
-    elif isinstance(formula, Quantified):
-        _collect(formula.part, positive, found)
-    elif not isinstance(formula, Truth):
-        found.append((formula, positive))
 
 
 def conjuncts(formula: Formula) -> tuple[Formula, ...]:
@@ -159,24 +151,20 @@ def label(name: str, args: Iterable[Term]) -> str:
 
 def formula_text(formula: Formula) -> str:
     """A formula as PDDL text."""
-    return fold(formula, _leaf_text, _compound_text)
-
-
-def _leaf_text(leaf: Leaf) -> str:
-    match leaf:
+    match formula:
         case Atom(name, args) | StepAtom(name, args):
             return label(name, args)
         case Equal(left, right):
             return label("=", (left, right))
         case Truth(value):
             return "()" if value else "(or)"
-
-
-def _compound_text(compound: Compound, parts: Iterator[str]) -> str:
-    declared = []
-    if isinstance(compound, Quantified):
-        declared = [f"({' '.join(map(declaration, compound.variables))})"]
-    return label(type(compound).__name__.lower(), (*declared, *parts))
+        case Not(part):
+            return label("not", (formula_text(part),))
+        case Quantified(variables, part):
+            declared = f"({' '.join(map(declaration, variables))})"
+            return label(type(formula).__name__.lower(), (declared, formula_text(part)))
+        case Junction(parts):
+            return label(type(formula).__name__.lower(), map(formula_text, parts))
 
 
 def declaration(variable: Variable) -> str:
