@@ -20,7 +20,7 @@ from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
 from planners.loading import PlanningInstance
 from planners.pddl.formula_tree import formula_text
-from planners.pddl.lifted import Domain, StepAtom
+from planners.pddl.lifted import Domain, StepAtom, supertypes
 from planners.pddl.pddl_text import domain_text, problem_text
 from planners.search.reachable import count as count_reachable
 from planners.search.search_estimate import SearchEstimate, estimate
@@ -236,7 +236,7 @@ def _objects(loaded: PlanningInstance) -> dict[str, int]:
     """How many objects each type has; untyped ones count as ``object``."""
     found: list[str] = []
     for own in loaded.problems[0].objects.values():
-        types = {t for each in own for t in loaded.domain.supertypes(each)}
+        types = {t for each in own for t in supertypes(loaded.domain.types, each)}
         found += types if own == ("object",) else types - {"object"}
     return _counted(found)
 

@@ -20,7 +20,7 @@ from planners.joint.model import JointModel
 from planners.joint.states import TrueFacts
 from planners.joint.tables import Bools, Ints, Rows
 from planners.loading import PlanningInstance
-from planners.pddl.lifted import Domain, Problem
+from planners.pddl.lifted import Domain, Problem, supertypes
 from planners.pddl.robots import static_atoms
 from planners.search.graphs import csgraph
 
@@ -70,7 +70,7 @@ class World(Asked):
         self.statics = {name: sorted(own) for name, own in sorted(statics.items())}
         types: dict[str, set[str]] = {}
         for name, own in problem.objects.items():
-            for kind in frozenset().union(*map(domain.supertypes, own)):
+            for kind in {t for each in own for t in supertypes(domain.types, each)}:
                 types.setdefault(kind, set()).add(name)
         self.types = dict(sorted(types.items()))
         given = {n: p for n, p in (points or {}).items() if n in problem.objects}

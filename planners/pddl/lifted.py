@@ -197,10 +197,6 @@ class Domain:
         """Whether the schemas are whole joint actions (``; subaction`` comments)."""
         return any(schema.parts for schema in self.schemas)
 
-    def supertypes(self, name: str) -> frozenset[str]:
-        """The type itself, every type above it, and ``object``."""
-        return supertypes(self.types, name)
-
 
 def supertypes(types: Mapping[str, tuple[str, ...]], name: str) -> frozenset[str]:
     """A type itself, every type above it, and ``object``; ``types`` have direct supertypes."""

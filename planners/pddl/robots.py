@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from planners.pddl.formula_tree import required_atoms
-from planners.pddl.lifted import Atom, Domain, Formula, Problem, Schema, Variable
+from planners.pddl.lifted import Atom, Domain, Formula, Problem, Schema, Variable, supertypes
 from planners.pddl.model_options import ModelOptions, Unowned
 from planners.system.errors import BadInput, UsageError, note
 from planners.system.messages import echoed, some
@@ -68,7 +68,7 @@ def objects_of(domain: Domain, problem: Problem, types: Sequence[str]) -> tuple[
     found = [
         name
         for name, own in problem.objects.items()
-        if "object" in wanted or any(domain.supertypes(t) & wanted for t in own)
+        if "object" in wanted or any(supertypes(domain.types, t) & wanted for t in own)
     ]
     return tuple(sorted(found, key=natural))
 
@@ -206,7 +206,7 @@ class _Kinds:
 
     def is_one(self, variable: Variable, kind: str) -> bool:
         """Whether all that a variable stands for is of a type."""
-        return all(kind in self.domain.supertypes(own) for own in variable.types)
+        return all(kind in supertypes(self.domain.types, own) for own in variable.types)
 
     def taken_by_all(self) -> list[str]:
         """The most specific types of which every action takes an object."""
@@ -215,7 +215,7 @@ class _Kinds:
             for kind in self.inhabited()
             if all(any(self.is_one(p, kind) for p in s.parameters) for s in self.domain.schemas)
         ]
-        above = {t for kind in found for t in self.domain.supertypes(kind) - {kind}}
+        above = {t for kind in found for t in supertypes(self.domain.types, kind) - {kind}}
         return [kind for kind in found if kind not in above]
 
     def unclear(self, why: str, candidates: Sequence[str]) -> BadInput:
@@ -250,7 +250,7 @@ def _guessed(kinds: _Kinds, kind: str) -> tuple[tuple[str, ...], str]:
         doubt = "are all its objects"
     elif len(robots) > _MOST_GUESSED:
         doubt = f"are {len(robots):,}"
-    elif not any(kind in domain.supertypes(t) for variable in first for t in variable.types):
+    elif not any(kind in supertypes(domain.types, t) for own in first for t in own.types):
         doubt = "are never the first argument of an action"
     elif not _acts(kinds, kind):
         doubt = "never move or hold anything"
