@@ -16,9 +16,9 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import parent_process, resource_tracker
+from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import wait
-from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.process import BaseProcess
 from types import FrameType, ModuleType
 from typing import Any
 
@@ -45,8 +45,8 @@ def in_processes(
     Raises `BrokenExecutor` if a process is lost, `UsageError` or `OutOfMemory` if none can be
     started.
     """
-    context = _Context()
-    executor = ProcessPoolExecutor(count, context, _begin, (Packed(batch), memory))
+    executor = ProcessPoolExecutor(count, get_context("spawn"), _begin, (Packed(batch), memory))
+    started = executor._processes  # before Python 3.14 nothing public knows or ends them
     try:
         with _spawning():
             futures = [executor.submit(_do, job) for job in jobs]
@@ -54,7 +54,7 @@ def in_processes(
             executor.submit(int)
         yield futures
     except OSError as error:
-        if any(process.exitcode is not None for process in context.started if process.pid):
+        if any(process.exitcode is not None for process in started.values()):
             raise BrokenProcessPool(f"a worker ended as it was started: {error}") from None
         kind = OutOfMemory if lacks_memory(error) else UsageError
         raise kind(
@@ -63,26 +63,12 @@ def in_processes(
         ) from None
     finally:
         with postponed_signals():
-            _end(context.started)
+            _end([*started.values()])
             executor.shutdown(cancel_futures=True)
 
 
-class _Context(SpawnContext):
-    """Starts processes, and knows them."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.started: list[SpawnProcess] = []
-
-    def Process(self, *args: Any, **keywords: Any) -> SpawnProcess:  # type: ignore[override]  # noqa: N802
-        process = SpawnProcess(*args, **keywords)
-        self.started.append(process)
-        return process
-
-
-def _end(started: Sequence[SpawnProcess]) -> None:
+def _end(started: Sequence[BaseProcess]) -> None:
     """End processes, by force where they do not end by themselves."""
-    started = [process for process in started if process.pid is not None]
     for process in started:
         process.terminate()
     left, end = {process.sentinel for process in started}, time.monotonic() + _STOPPING
@@ -121,10 +107,6 @@ def _spawning() -> Iterator[None]:
 _attempt: Callable[[Any], Outcome]
 
 
-class _Ended(SystemExit):
-    """A signal ends the worker, wherever it is."""
-
-
 def _begin(work: Packed, memory: int | None) -> None:
     """Prepare this process: output, signals, and so many bytes more than its libraries take."""
     global _attempt
@@ -146,14 +128,14 @@ def _begin(work: Packed, memory: int | None) -> None:
 def _do(job: Any) -> Outcome:
     try:
         return _attempt(job)
-    except _Ended:  # all has been cleaned up; the executor would send it as a result
+    except SystemExit:  # all has been cleaned up; the executor would send it as a result
         os._exit(_ASKED_TO_END)
 
 
 def _asked_to_end(_signal: int, _frame: FrameType | None) -> None:
     for number in ENDING:  # the executor asks again once another worker has ended
         signal.signal(number, signal.SIG_IGN)
-    raise _Ended(_ASKED_TO_END)
+    sys.exit(_ASKED_TO_END)
 
 
 def _end_with_parent() -> None:
