@@ -10,6 +10,7 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from os import PathLike
 from unicodedata import normalize
 
@@ -49,12 +50,6 @@ UNSUPPORTED = {
     ":event": "events (PDDL+)",
 }
 _SECTIONS = frozenset().union(*SECTIONS.values(), UNSUPPORTED)
-
-
-def _sha256(text: str) -> str:
-    from hashlib import sha256  # which loads OpenSSL
-
-    return sha256(text.encode()).hexdigest()
 
 
 def _read_tokens(text: str) -> Iterator[str]:
@@ -109,12 +104,12 @@ class Source:
 
         Of the tokens in lower case, each on a line, comments that are `SUBACTION` ones included.
         """
-        return _sha256("\n".join(_read_tokens(self.text)))
+        return sha256("\n".join(_read_tokens(self.text)).encode()).hexdigest()
 
     @property
     def text_sha256(self) -> str:
         """The hash of the text, byte by byte, as language files had it up to version 0.1."""
-        return _sha256(self.text)
+        return sha256(self.text.encode()).hexdigest()
 
 
 class _Placed:
