@@ -131,17 +131,15 @@ def joined(kind: type[And] | type[Or], parts: Iterable[Formula]) -> Formula:
 
 def substituted(formula: Formula, value: Callable[[GroundLeaf], Formula]) -> Formula:
     """A ground formula with a formula for each of its atoms, simplified as by `joined`."""
-
-    def leaf(found: Leaf) -> Formula:
-        return value(found) if isinstance(found, GroundLeaf) else found
-
-    def compound(kind: Compound, parts: Iterator[Formula]) -> Formula:
-        if isinstance(kind, Not):
-            return negated(next(parts))
-        assert isinstance(kind, Junction), "a quantifier in a ground formula"
-        return joined(type(kind), parts)
-
-    return fold(formula, leaf, compound)
+    match formula:
+        case Not(part):
+            return negated(substituted(part, value))
+        case And(parts) | Or(parts):
+            return joined(type(formula), (substituted(part, value) for part in parts))
+        case Atom() | StepAtom():
+            return value(formula)
+    assert isinstance(formula, Truth), "a quantifier in a ground formula"
+    return formula
 
 
 def label(name: str, args: Iterable[Term]) -> str:
