@@ -51,8 +51,8 @@ from planners.system.limits import reaching
 Binding = dict[str, str]
 #: An atom without which an instance of a quantified part is no matter.
 Guard = Atom | StepAtom
-#: A quantified formula, the variables in it and its guards (`_Grounder._shape`).
-_Shape = tuple[Formula, tuple[str, ...], tuple[Atom, ...], tuple[StepAtom, ...]]
+#: The variables in a quantified formula, and its guards (`_Grounder._shape_of`).
+_Shape = tuple[tuple[str, ...], tuple[Atom, ...], tuple[StepAtom, ...]]
 #: From this many values for the variables on, only subactions that are ever possible are tried.
 _MANY = 1000
 
@@ -230,8 +230,7 @@ class _Grounder:
         self._owners_of = cache(self._owners_named)
         #: Ground quantified formulas by the values of variables in them: actions share most.
         self._quantified: dict[tuple[object, ...], Formula] = {}
-        #: By the identity of a quantified formula, which is there too so that it stays alive.
-        self._shapes: dict[int, _Shape] = {}
+        self._shape = cache(self._shape_of)
 
     def action(self, schema: Schema, args: tuple[str, ...], costs: bool) -> GroundAction | None:
         """The instance, or None if its precondition is false in every state."""
@@ -293,8 +292,8 @@ class _Grounder:
     def _quantifier(
         self, f: Forall | Exists, binding: Binding, positive: bool, acting: tuple[int, ...]
     ) -> Formula:
-        _, names, statics, steps = self._shapes.get(id(f)) or self._shape(f)
-        key = id(f), positive, acting, *map(binding.get, names)
+        names, statics, steps = self._shape(f)
+        key = f, positive, acting, *map(binding.get, names)
         found = self._quantified.get(key)
         if found is None:
             kind = And if isinstance(f, Forall) == positive else Or
@@ -309,7 +308,7 @@ class _Grounder:
             self._quantified[key] = found
         return found
 
-    def _shape(self, f: Forall | Exists) -> _Shape:
+    def _shape_of(self, f: Forall | Exists) -> _Shape:
         """The variables in a formula, and its guards.
 
         Guards are static atoms and actions that the part requires under ``exists``, and its
@@ -321,8 +320,7 @@ class _Grounder:
         part = f.part if isinstance(f, Exists) else negated(f.part)
         changing = {leaf for leaf in leaves if not self._is_static(leaf)}
         steps = tuple(p for p in conjuncts(part) if isinstance(p, StepAtom) and {p} == changing)
-        found = self._shapes[id(f)] = (f, names, self._static_atoms(part), steps)
-        return found
+        return names, self._static_atoms(part), steps
 
     def _static_atoms(self, f: Formula) -> tuple[Atom, ...]:
         """The static atoms among the parts that must all hold."""
