@@ -15,7 +15,7 @@ import numpy as np
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import WRITTEN, InspectOptions
 from coordlang.commands.terminal import WIDTH, columns, echo, line_width, note_single_robot
-from planners.grounding.instantiate import idling_schemas
+from planners.grounding.actions import idling_schemas
 from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
 from planners.loading import PlanningInstance

@@ -42,7 +42,7 @@ from coordlang.unified import NAME
 from coordlang.unified.plans import NoSteps, leaves_steps_open, of_up, to_up
 from coordlang.unified.translation import FEATURES, Concurrency, Subactions, Translated, translate
 from planners.check.rules import Verdict, validate
-from planners.grounding.instantiate import idling_schemas
+from planners.grounding.actions import idling_schemas
 from planners.loading import build
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search

@@ -15,7 +15,7 @@ from functools import cache
 from itertools import chain, combinations, islice, product
 from typing import NamedTuple
 
-from planners.pddl.formula_tree import conjuncts, label, negated, required_atoms
+from planners.pddl.formula_tree import conjuncts, label, negated, required_atoms, step_atoms
 from planners.pddl.lifted import (
     And,
     Atom,
@@ -69,6 +69,20 @@ class GroundAction:
         if self.parts:
             return self.parts[robot]
         return self.label if robot in self.owners else None
+
+
+def idling_schemas(domain: Domain) -> frozenset[str]:
+    """The action schemas that are idling: without effects as written, and named nowhere.
+
+    A robot may always idle; with such an action besides every plan would be there twice.  One that
+    a formula or a network names is none: another action may depend on it.  A joint action says
+    itself who idles.
+    """
+    if domain.is_joint_action:
+        return frozenset()
+    named = {atom.action for schema in domain.schemas for atom in step_atoms(schema)}
+    named |= {name for constraint in domain.constraints for name, _ in constraint.actions}
+    return frozenset(s.name for s in domain.schemas if not s.effects) - named
 
 
 class Impossible(NamedTuple):

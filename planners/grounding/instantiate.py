@@ -11,17 +11,9 @@ from dataclasses import replace
 from functools import cache
 from math import prod
 
-from planners.grounding.actions import GroundAction
+from planners.grounding.actions import GroundAction, idling_schemas
 from planners.grounding.reachability import Arguments, reachable_arguments
-from planners.pddl.formula_tree import (
-    conjuncts,
-    joined,
-    label,
-    literals,
-    negated,
-    required_atoms,
-    step_atoms,
-)
+from planners.pddl.formula_tree import conjuncts, joined, label, literals, negated, required_atoms
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
     FALSE,
@@ -162,20 +154,6 @@ def ground_actions(
                 if action is not None:
                     actions.append(action)
     return tuple(actions)
-
-
-def idling_schemas(domain: Domain) -> frozenset[str]:
-    """The action schemas that are idling: without effects as written, and named nowhere.
-
-    A robot may always idle; with such an action besides every plan would be there twice.  One that
-    a formula or a network names is none: another action may depend on it.  A joint action says
-    itself who idles.
-    """
-    if domain.is_joint_action:
-        return frozenset()
-    named = {atom.action for schema in domain.schemas for atom in step_atoms(schema)}
-    named |= {name for constraint in domain.constraints for name, _ in constraint.actions}
-    return frozenset(s.name for s in domain.schemas if not s.effects) - named
 
 
 def idling_costs(domain: Domain, problem: Problem, team: Team, *, costs: bool) -> tuple[int, ...]:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import Phase, event, given, settings
 from hypothesis import strategies as st
 
-from planners.grounding.instantiate import idling_schemas
+from planners.grounding.actions import idling_schemas
 from tests.support.joint_twin import built, check_model, twin_of
 from tests.support.random_models import random_threes
 from tests.support.random_pddl import KINDS, Kind, RandomModel, random_model
