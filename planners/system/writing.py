@@ -71,11 +71,7 @@ def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | No
                 file.write(data)
             return
         target = Path(os.path.realpath(path))
-        with (
-            postponed_signals(),
-            _written_beside(target, data) as beside,
-            _set_aside(outdated),
-        ):
+        with postponed_signals(), _written_beside(target, data) as beside, _set_aside(outdated):
             os.replace(beside, target)
     except BrokenPipeError:
         raise
