@@ -16,14 +16,7 @@ from planners.joint.states import FactTable, StateCodec
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.robots import (
-    Team,
-    find_team,
-    fluent_predicates,
-    natural,
-    static_atoms,
-    without_idle_environment,
-)
+from planners.pddl.robots import Team, find_team, fluent_predicates, natural, static_atoms
 from planners.system.errors import BadInput, Position, UsageError
 from planners.system.limits import reaching
 from planners.system.messages import echoed
@@ -83,7 +76,7 @@ def build(
         lambda: f"comparing {len(actions):,} ground actions of {len(team.robots)} robots", FEWER
     ):
         actions = apply_network(domain, first, actions)
-        team = without_idle_environment(team, (i for action in actions for i in action.owners))
+        team = team.without_idle_environment(i for action in actions for i in action.owners)
         model = _joint_model(domain, first, team, actions, starts, options)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
     return PlanningInstance(domain, tuple(problems), model, tasks, options, team)

@@ -13,36 +13,9 @@ from typing import NamedTuple
 
 from planners.pddl.formula_tree import step_atoms
 from planners.pddl.formulas import read_effects, read_formula
-from planners.pddl.lifted import (
-    TRUE,
-    Constraint,
-    Domain,
-    Part,
-    Schema,
-    Signatures,
-    Variable,
-    have_common,
-)
-from planners.pddl.names import (
-    Names,
-    Sections,
-    is_token,
-    known,
-    read_header,
-    read_objects,
-    typed_list,
-    unknown,
-)
-from planners.pddl.sexpr import (
-    Expression,
-    Group,
-    Source,
-    Token,
-    first_text,
-    parse,
-    read_source,
-    subaction_comments,
-)
+from planners.pddl.lifted import TRUE, Constraint, Domain, Part, Schema, Signatures, Variable
+from planners.pddl.names import Names, Sections, is_token, known, read_header, typed_list, unknown
+from planners.pddl.sexpr import Expression, Group, Source, Token, first_text, parse, read_source
 from planners.system.files import require_seen
 from planners.system.limits import reaching
 from planners.system.messages import echoed
@@ -79,8 +52,8 @@ def parse_domains(sources: Sequence[Source]) -> list[Domain]:
     return [_finish(actions, *parts) for parts in begun]
 
 
-def _begin(source: Source) -> tuple[str, Source, Sections, Names, list[_Head]]:
-    """A domain's name, its text with the sections, and its actions, without their formulas."""
+def _begin(source: Source) -> tuple[str, Sections, Names, list[_Head]]:
+    """A domain's name, its sections, and its actions, without their formulas."""
     root = parse(source)
     name, sections = read_header(root, "domain")
     types = _read_types(root, sections)
@@ -88,18 +61,13 @@ def _begin(source: Source) -> tuple[str, Source, Sections, Names, list[_Head]]:
     # "- number" may stand behind functions.
     functions = (i for i in _entries(sections, ":functions") if isinstance(i, Group))
     names = Names(types, _read_signatures(predicates, types), in_domain=True)
-    constants = read_objects(names, sections.get(":constants", ()), {})
+    constants = names.read_objects(sections.get(":constants", ()), {})
     names = replace(names, functions=_read_signatures(functions, types), objects=constants)
-    return name, source, sections, names, _read_heads(names, root, sections)
+    return name, sections, names, _read_heads(names, root, sections)
 
 
 def _finish(
-    actions: Mapping[str, int],
-    name: str,
-    source: Source,
-    sections: Sections,
-    names: Names,
-    heads: list[_Head],
+    actions: Mapping[str, int], name: str, sections: Sections, names: Names, heads: list[_Head]
 ) -> Domain:
     """A domain whose formulas may speak of ``actions``, too."""
     own = {head.name.text: len(head.parameters) for head in heads}
@@ -115,7 +83,7 @@ def _finish(
             "A joint action already says what every robot does.",
         )
     declared = names.types, names.objects, names.predicates, names.functions
-    return Domain(name, source, *declared, schemas, constraints, dependences)
+    return Domain(name, heads[0].item.source, *declared, schemas, constraints, dependences)
 
 
 def _read_types(root: Group, sections: Sections) -> dict[str, tuple[str, ...]]:
@@ -338,7 +306,7 @@ def _check_parts(schemas: Sequence[Schema], heads: Sequence[_Head]) -> None:
     Such as comments outside of actions: they would be silently ignored.
     """
     read = {comment.offset for head in heads for comment in head.item.comments}
-    for comment in subaction_comments(heads[0].item.source):
+    for comment in heads[0].item.source.subaction_comments():
         if comment.offset not in read:
             remedy = (
                 "Write '; subaction ROBOT ..' inside of the action, or begin with another word."
@@ -434,7 +402,7 @@ def _positions(
             f"Each says which argument a parameter of the constraint is. {_FROM_0}",
         )
     for parameter, position in zip(parameters, positions, strict=True):
-        if not have_common(names.types, parameter.types, own[position].types):
+        if not names.have_common(parameter.types, own[position].types):
             here, there = (
                 f"{one.name} - {' or '.join(one.types)}" for one in (own[position], parameter)
             )

@@ -16,16 +16,7 @@ from typing import Any, TypeVar
 
 from planners.pddl.domain import parse_domains
 from planners.pddl.formula_tree import label
-from planners.pddl.lifted import (
-    And,
-    Atom,
-    Constraint,
-    Domain,
-    Effect,
-    Problem,
-    Quantified,
-    Schema,
-)
+from planners.pddl.lifted import And, Atom, Constraint, Domain, Effect, Problem, Quantified, Schema
 from planners.pddl.problem import read_problem
 from planners.pddl.robots import objects_of
 from planners.pddl.sexpr import Source, read_source

@@ -6,7 +6,7 @@ All names are in lower case.  Formulas keep the user's structure; nothing is nor
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from planners.pddl.sexpr import Source
@@ -208,16 +208,6 @@ def supertypes(types: Mapping[str, tuple[str, ...]], name: str) -> frozenset[str
                 seen.add(parent)
                 todo.append(parent)
     return frozenset(seen)
-
-
-def have_common(
-    types: Mapping[str, tuple[str, ...]], first: Collection[str], second: Collection[str]
-) -> bool:
-    """Whether some type is one of the ``first`` or below, and one of the ``second`` or below."""
-    return any(
-        not above.isdisjoint(first) and not above.isdisjoint(second)
-        for above in (supertypes(types, name) for name in ("object", *types))
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from string import ascii_lowercase
 
-from planners.pddl.lifted import Atom, Signatures, Variable, have_common
+from planners.pddl.lifted import Atom, Signatures, Variable, supertypes
 from planners.pddl.sexpr import SECTIONS, UNSUPPORTED, Expression, Group, Token, first_text
 from planners.system.errors import BadInput, Unsupported, note
 from planners.system.messages import echoed, visible
@@ -151,6 +151,43 @@ class Names:
                 what = f"type {echoed(name)} of {echoed(token.text)} is not declared"
                 raise token.fail(what, known(self.types, name, "type"))
 
+    def have_common(self, first: Collection[str], second: Collection[str]) -> bool:
+        """Whether some type is one of the ``first`` or below and one of the ``second`` or below."""
+        if (first, second) not in self._common:
+            self._common[first, second] = any(
+                not above.isdisjoint(first) and not above.isdisjoint(second)
+                for above in (supertypes(self.types, name) for name in ("object", *self.types))
+            )
+        return self._common[first, second]
+
+    def read_objects(
+        self, sections: Sequence[Group], known: Mapping[str, tuple[str, ...]]
+    ) -> dict[str, tuple[str, ...]]:
+        """Objects with their types: those known, and those that sections declare.
+
+        A section is a typed list, with ``(:private ..)`` groups.
+        """
+        objects, parts = {**known}, list[tuple[list[Typed], list[Group]]]()
+        for section in sections:
+            private = [i for i in section.items if isinstance(i, Group) and i.head == ":private"]
+            own = [item for item in section.items[1:] if item not in private]
+            parts.append((typed_list(own, "an object"), private))
+        declared = {*known, *(token.text for own, _ in parts for token, _ in own)}
+        for entries, private in parts:
+            self._declare(objects, entries)
+            for group in private:
+                inner = _without_owner(group, declared | objects.keys())
+                self._declare(objects, typed_list(inner, "an object"))
+        return objects
+
+    def _declare(self, objects: dict[str, tuple[str, ...]], entries: Iterable[Typed]) -> None:
+        for token, types in entries:
+            self.check_types(token, types)
+            if token.text.startswith("?"):
+                remedy = f"Names of objects have no '?': {visible(token.text[1:_SHOWN])}."
+                raise token.fail("a variable cannot be an object", remedy)
+            objects[token.text] = tuple(dict.fromkeys((*objects.get(token.text, ()), *types)))
+
     def term(self, item: Expression) -> str:
         """A variable in scope or a declared object."""
         if isinstance(item, Group):
@@ -180,9 +217,7 @@ class Names:
         for number, (part, allowed) in enumerate(zip(item.items[1:], signature, strict=False), 1):
             term = part.token("a term")
             own = (self.variables if term.text in self.variables else self.objects)[term.text]
-            if (own, allowed) not in self._common:
-                self._common[own, allowed] = have_common(self.types, own, allowed)
-            if not self._common[own, allowed]:
+            if not self.have_common(own, allowed):
                 declared = " ".join(" or ".join(sorted(types)) for types in signature)
                 raise term.fail(
                     f"argument {number} of {echoed(item.head)}, {echoed(term.text)}, is of type "
@@ -217,36 +252,6 @@ def unknown(what: str, item: Group, declared: Iterable[str]) -> BadInput | Unsup
     if feature is not None:
         return item.unsupported(f"{feature.format(item.head)} is")
     return item.fail(f"unknown {what} {echoed(item.head)}", known(declared, item.head, what))
-
-
-def read_objects(
-    names: Names, sections: Sequence[Group], known: Mapping[str, tuple[str, ...]]
-) -> dict[str, tuple[str, ...]]:
-    """Objects with their types: those known, and those that sections declare.
-
-    A section is a typed list, with ``(:private ..)`` groups.
-    """
-    objects, parts = {**known}, list[tuple[list[Typed], list[Group]]]()
-    for section in sections:
-        private = [i for i in section.items if isinstance(i, Group) and i.head == ":private"]
-        own = [item for item in section.items[1:] if item not in private]
-        parts.append((typed_list(own, "an object"), private))
-    declared = {*known, *(token.text for own, _ in parts for token, _ in own)}
-    for entries, private in parts:
-        _declare(names, objects, entries)
-        for group in private:
-            inner = _without_owner(group, declared | objects.keys())
-            _declare(names, objects, typed_list(inner, "an object"))
-    return objects
-
-
-def _declare(names: Names, objects: dict[str, tuple[str, ...]], entries: Iterable[Typed]) -> None:
-    for token, types in entries:
-        names.check_types(token, types)
-        if token.text.startswith("?"):
-            remedy = f"Names of objects have no '?': {visible(token.text[1:_SHOWN])}."
-            raise token.fail("a variable cannot be an object", remedy)
-        objects[token.text] = tuple(dict.fromkeys((*objects.get(token.text, ()), *types)))
 
 
 def _without_owner(section: Group, declared: Collection[str]) -> Sequence[Expression]:

@@ -8,7 +8,7 @@ from os import PathLike
 
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
-from planners.pddl.names import Names, Sections, read_header, read_objects
+from planners.pddl.names import Names, Sections, read_header
 from planners.pddl.sexpr import Group, Source, Token, parse, read_source
 from planners.system.limits import reaching
 from planners.system.messages import echoed
@@ -37,7 +37,7 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
                 f"The domain was read from {domain.source.name}.",
             )
     names = Names(domain.types, domain.predicates, domain.functions)
-    objects = read_objects(names, sections.get(":objects", ()), domain.constants)
+    objects = names.read_objects(sections.get(":objects", ()), domain.constants)
     names = replace(names, objects=objects)
     init: set[Atom] = set()
     values: dict[Atom, float] = {}

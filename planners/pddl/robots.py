@@ -61,6 +61,12 @@ class Team:
             return (len(self.robots) - 1,)
         return tuple(range(len(self.robots)))
 
+    def without_idle_environment(self, owners: Iterable[int]) -> Team:
+        """The team without the environment if it owns no ground action: then nobody owns any."""
+        if self.unowned != "environment" or len(self.robots) - 1 in set(owners):
+            return self
+        return replace(self, robots=self.robots[:-1], unowned="error")
+
 
 def objects_of(domain: Domain, problem: Problem, types: Sequence[str]) -> tuple[str, ...]:
     """The objects that belong to one of ``types``, in natural order."""
@@ -143,13 +149,6 @@ def _require_agreement(
         what = f"the language file's robots {', '.join(choice.names)} contradict the domain"
         raise BadInput(what, position=kinds.problem.source.section(":objects"), remedy=remedy)
     raise UsageError(f"{said} contradicts the domain", remedy=remedy)
-
-
-def without_idle_environment(team: Team, owners: Iterable[int]) -> Team:
-    """The team without the environment if it owns no ground action: then nobody owns any."""
-    if team.unowned != "environment" or len(team.robots) - 1 in set(owners):
-        return team
-    return replace(team, robots=team.robots[:-1], unowned="error")
 
 
 def _declared(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str] | None:

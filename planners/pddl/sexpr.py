@@ -37,9 +37,7 @@ SECTIONS = {
         *(":requirements", ":types", ":constants", ":predicates", ":functions", ":action"),
         *(":concurrency-constraint", ":positive-dependence"),
     },
-    "problem": {
-        *(":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length"),
-    },
+    "problem": {":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length"},
 }
 #: The same for what is not supported, and what it is.
 UNSUPPORTED = {
@@ -97,6 +95,12 @@ class Source:
         tokens = [(match[0].lower(), match.start()) for match in _TOKEN.finditer(self.text)]
         found = (at for wanted in (name, "(") for text, at in tokens if text == wanted)
         return self.position(next(found, 0))
+
+    def subaction_comments(self) -> Iterator[Token]:
+        """All comments that begin with the word `SUBACTION`, also those that `parse` leaves out."""
+        for match in _TOKEN.finditer(self.text):
+            if _ABOUT_SUBACTION.match(match[0]):
+                yield Token(match[0], match.start(), self)
 
     @property
     def sha256(self) -> str:
@@ -244,13 +248,6 @@ def parse(source: Source) -> Group:
         what = "expected '(define ...', found an empty file"
         raise BadInput(what, position=Position(source.name), remedy=_NO_PDDL)
     return top[0].group("a list")
-
-
-def subaction_comments(source: Source) -> Iterator[Token]:
-    """All comments that begin with the word `SUBACTION`, also those that `parse` leaves out."""
-    for match in _TOKEN.finditer(source.text):
-        if _ABOUT_SUBACTION.match(match[0]):
-            yield Token(match[0], match.start(), source)
 
 
 def _require_plain_names(source: Source) -> None:
