@@ -17,7 +17,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass
-from multiprocessing import connection, resource_tracker
+from multiprocessing import resource_tracker
 from os import PathLike
 from types import FrameType, ModuleType
 from typing import Any
@@ -216,10 +216,9 @@ def _end(started: Sequence[multiprocessing.process.BaseProcess]) -> None:
     """End processes, by force where they do not end by themselves."""
     for process in started:
         process.terminate()
-    left, end = {process.sentinel for process in started}, time.monotonic() + _STOPPING
-    while left and (seconds := end - time.monotonic()) > 0:
-        left.difference_update(connection.wait(left, seconds))
+    end = time.monotonic() + _STOPPING
     for process in started:
+        process.join(max(0.0, end - time.monotonic()))
         process.kill()
 
 

@@ -49,13 +49,6 @@ _NO_REASON = ("without exception set", "without setting an exception")
 _LONGER = "Use a larger --time-limit."
 #: Of the memory that is free, what a process takes that is given no limit.
 _SHARE = 0.8
-#: Where Linux says what the machine has and what a process takes; elsewhere psutil knows, which
-#: takes as long to load as a small task to solve.
-_MEMORY_OF_MACHINE = "/proc/meminfo"
-_MEMORY_OF_PROCESS = "/proc/self/statm"
-_AVAILABLE = re.compile(r"^MemAvailable:\s*(\d+) kB$", re.MULTILINE)
-#: Where control groups (version 2) are.
-_GROUPS = "/sys/fs/cgroup"
 
 
 @contextmanager
@@ -281,11 +274,11 @@ def address_space_left() -> float:
 
 def _available() -> int:
     """Bytes that the machine, or the process's control group, has free or can free at once."""
-    with suppress(OSError):
-        found = _AVAILABLE.search(Path(_MEMORY_OF_MACHINE).read_text())
-        if found is not None:
+    with suppress(OSError):  # of Linux
+        text = Path("/proc/meminfo").read_text()
+        if found := re.search(r"^MemAvailable:\s*(\d+) kB$", text, re.M):
             return min(int(found[1]) * 2**10, _group_memory_left())
-    import psutil
+    import psutil  # which takes as long to load as a small task to solve
 
     return int(psutil.virtual_memory().available)  # there are no control groups
 
@@ -303,17 +296,17 @@ def _group_memory_left() -> int:
 
 
 def _memory_groups() -> Iterator[Path]:
-    """The folders of the control groups that this process is in, and those above."""
+    """The folders of the control groups (version 2) that this process is in, and those above."""
     with suppress(OSError):
         own = Path("/proc/self/cgroup").read_text().strip().rpartition("0::/")[2]
-        yield Path(_GROUPS, own)
-        yield from Path(_GROUPS, own).parents  # in a container ``own`` may be of the machine
+        group = Path("/sys/fs/cgroup", own)
+        yield from (group, *group.parents)  # in a container ``own`` may be of the machine
 
 
 def address_space() -> int:
     """Bytes of address space that this process has."""
     with suppress(OSError):
-        return int(Path(_MEMORY_OF_PROCESS).read_text().split()[0]) * resource.getpagesize()
+        return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     import psutil
 
     return int(psutil.Process().memory_info().vms)

@@ -26,8 +26,6 @@ def visible(text: str, keep: str = "") -> str:
 
     The escapes are those of JSON, so that JSON text stays the same JSON.
     """
-    if (text.replace("\n", "") if "\n" in keep else text).isprintable():
-        return text  # as most are: then the pattern, a large one, need not be compiled
     return re.sub(UNSEEN, lambda found: found[0] if found[0] in keep else _escape(found[0]), text)
 
 
