@@ -15,8 +15,7 @@ import pytest
 
 from coordlang.verification.certificate_file import Cnf, read_certificate
 from coordlang.verification.check_certificate import check
-from planners.pddl import parse_domain
-from planners.pddl.lifted import supertypes
+from planners.pddl import lifted, parse_domain
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, OutOfMemory, Refuted
 from planners.system.files import read_bytes
@@ -158,7 +157,7 @@ def test_ten_thousand_types_one_below_the_other() -> None:
     types = " ".join(f"t{n} - t{n + 1}" for n in range(10_000))
     with time_limit(15):  # with a look at all types above each type: minutes
         domain = parse_domain(typed(types, "(p) (q ?x - t10000)"))
-        assert len(supertypes(domain.types, "t0")) == 10_002
+        assert len(lifted.supertypes(domain.types, "t0")) == 10_002
         with pytest.raises(BadInput, match="the types form a cycle: t4000 - t4001 - "):
             parse_domain(typed(types.replace("t9999 - t10000", "t9999 - t4000")))
 
