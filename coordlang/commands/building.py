@@ -146,13 +146,13 @@ def _few_words(making: Making, words: int, *, worst: bool, seed: int) -> Built:
     making.note("coordination")
     outcome, failures = few_words(job, words, worst=worst)
     making.note("vocabulary")
-    if not failures.worst:
+    if not any(failures):
         with little_time_after(outcome.stopped):
             making.check(outcome.partition)
         if not isinstance(outcome.stopped, KeyboardInterrupt):
             outcome = replace(outcome, stopped=None)  # no search was left where nothing fails
     making.note("verify")
-    return making.built(job, outcome, FEW_WORDS, failures=Failures(failures.mean, failures.worst))
+    return making.built(job, outcome, FEW_WORDS, failures=Failures(*failures))
 
 
 def job_for_few_words(making: Making, seed: int = 0) -> Job:

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A robot's subplans as the smallest deterministic automaton over its own subactions.
+"""A robot's subplans as an automaton over its own subactions, and all combinations of robots'.
 
 The robot's subplans are what the plans of a plan space are when only its own subactions are seen.
 All of them have one length, so the automaton has no cycles and its states lie in layers, one a
 step.  Where robots keep no common step it is one an event of the robot, and who has no more idles.
+
+That all combinations are optimal plans is proved directly, from the definition, for one task and
+one sentence: `walk_mixtures` walks nodes ``(a_1 .. a_n, y)``, the state of each robot's automaton
+and the plan-space node that all of them together have reached.
 """
 
 from __future__ import annotations
@@ -16,7 +20,14 @@ from itertools import accumulate, chain
 from operator import and_, or_
 from typing import NamedTuple
 
-from planners.search.plan_space import PlanSpace
+import numpy as np
+
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
+from planners.joint.conditions import Labels
+from planners.joint.tables import Ints, ranges, unique_rows
+from planners.search.edge_index import EdgeIndex
+from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.system.errors import OutOfMemory
 from planners.system.limits import reaching
 
@@ -83,10 +94,9 @@ def determinise(
     in.  It is then the least automaton with this output (a Moore machine: states are merged that
     agree on the knowledge, now and after every continuation).
 
-    Three passes over the layers: nodes that behave alike are one (upwards), subset construction
-    (downwards), equal futures are one (upwards).  Linear but for the subsets, of which there may be
-    exponentially many: raises `OutOfMemory` where they fill the memory or have more than ``most``
-    members.
+    Subset construction from the start down, then equal futures are one, upwards.  There may be
+    exponentially many subsets: raises `OutOfMemory` where they fill the memory or have more than
+    ``most`` members.
     """
     layers: list[_Layer] = []
 
@@ -121,15 +131,14 @@ def _subsets(
     """The layers, the start first."""
     true = [0] * len(space) if truth is None else truth
     labels, targets = space.robot_labels(robot).tolist(), space.targets().tolist()
-    alike = _alike(space, true, labels, targets)  # no set of own continuations is another one then
-    subsets: dict[_Nodes, None] = {(alike[int(space.starts[0])],): None}
+    subsets: dict[_Nodes, None] = {(int(space.starts[0]),): None}
     members = 0
     while subsets:
         layer: _Layer = {}
         for subset in subsets:
             after: dict[int, set[int]] = defaultdict(set)
             for edge in chain.from_iterable(map(space.out_edges, subset)):
-                after[labels[edge]].add(alike[targets[edge]])
+                after[labels[edge]].add(targets[edge])
             facts = [true[node] for node in subset]
             moves = {own: tuple(sorted(nodes)) for own, nodes in sorted(after.items())}
             layer[subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
@@ -142,18 +151,6 @@ def _subsets(
         subsets = dict.fromkeys(chain.from_iterable(every))
 
 
-def _alike(
-    space: PlanSpace, true: Sequence[int], labels: Sequence[int], targets: Sequence[int]
-) -> list[int]:
-    """For each node the first that knows the same, with the same labels to such nodes."""
-    first: dict[object, int] = {}
-    alike: list[int] = []
-    for node, layer in enumerate(space.layer.tolist()):
-        moves = frozenset((labels[edge], alike[targets[edge]]) for edge in space.out_edges(node))
-        alike.append(first.setdefault((layer, true[node], moves), node))
-    return alike
-
-
 def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:
     """Number the states layer by layer, where a walk by labels has met them in their order."""
     ends = [*accumulate(map(len, merged))]
@@ -164,3 +161,106 @@ def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:
     for state in reversed(range(layers[-1].start)):
         left[state] = sum(left[to] for to in moves[state].values())
     return Automaton(layers, moves, tuple(left), tuple(known for _, known, _ in states))
+
+
+# ---- every combination of the robots' choices
+
+
+@dataclass(frozen=True, slots=True)
+class Mixtures:
+    """What the robots can do together when each takes its choices as it likes.
+
+    ``space``: all of it, as a plan space of one task; None if some combination is no optimal plan,
+    and then ``witness`` shows one.  ``nodes`` counts what was walked.
+    """
+
+    space: PlanSpace | None
+    witness: Miscoordination | None
+    nodes: int
+
+
+def walk_mixtures(
+    task_language: TaskLanguage,
+    fits: PlanSpace,
+    automata: Sequence[Automaton],
+    words: Sequence[int],
+    most: int,
+) -> Mixtures | None:
+    """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
+
+    At most (product of the automata's layers) * (layer of the plan space) nodes.  ``automata`` are
+    the robots' subplans in ``fits``, the plans with the sentence ``words``.  None, before they are
+    made, where there are more than ``most`` joint moves.
+    """
+    space = task_language.space
+    index = EdgeIndex.of(space)
+    robots, moves = len(automata), [_Moves(own) for own in automata]
+    table = np.array([[0] * robots + [task_language.start]])
+    layers = [table[:, robots]]
+    steps: list[UnfoldingStep] = []
+    walked, made = 1, 0.0
+    for _ in range(automata[0].steps):
+        degrees = [own.degree[at] for own, at in zip(moves, table.T, strict=False)]
+        made += np.prod(degrees, axis=0, dtype=float).sum()
+        if made > most:
+            return None
+        source, labels, after = _together(moves, table)
+        edge = table[source, robots]
+        for robot in range(robots):
+            edge = index.follow(robot, edge, labels[:, robot])
+        broken = np.flatnonzero(edge < 0)
+        if len(broken):
+            last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
+            return Mixtures(None, _witness(task_language, fits, words, steps, *last), walked)
+        reached = np.column_stack((after, space.targets(edge)))
+        table, number = unique_rows(reached)
+        steps.append(UnfoldingStep(source, edge, number))
+        layers.append(table[:, robots])
+        walked += len(table)
+    found = PlanSpace.from_layers(space, layers, steps, task_language.task)
+    return Mixtures(found, None, walked)
+
+
+class _Moves:
+    """An automaton's moves, (label, next state): for each state their number and the first one."""
+
+    def __init__(self, automaton: Automaton) -> None:
+        self.degree = np.array([len(own) for own in automaton.moves], np.int64)
+        self.first = np.cumsum(self.degree) - self.degree
+        pairs = [pair for own in automaton.moves for pair in own.items()]
+        self.pairs = np.array(pairs, np.int64).reshape(-1, 2)
+
+
+def _together(moves: Sequence[_Moves], table: Ints) -> tuple[Ints, Labels, Ints]:
+    """All joint moves, sorted by source and labels: (source, labels, next automaton states)."""
+    found = np.arange(len(table))[:, None]  # the source, then for each robot label and next state
+    for robot, own in enumerate(moves):
+        state = table[found[:, 0], robot]
+        edges = ranges(own.first[state], own.degree[state])
+        found = np.hstack((np.repeat(found, own.degree[state], axis=0), own.pairs[edges]))
+    return found[:, 0], found[:, 1::2].astype(np.int32), found[:, 2::2]
+
+
+def _witness(
+    task_language: TaskLanguage,
+    fits: PlanSpace,
+    words: Sequence[int],
+    steps: Sequence[UnfoldingStep],
+    node: int,
+    labels: tuple[int, ...],
+) -> Miscoordination:
+    """Plans with the sentence whose mixture breaks at a node of the last layer, by these labels."""
+    space, start, done, paths = task_language.space, task_language.start, [labels], []
+    for step in reversed(steps):
+        arrival = int(np.flatnonzero(step.target == node)[0])
+        done.append(space.labels_of(int(step.edge[arrival])))
+        node = int(step.source[arrival])
+    for robot in range(len(labels)):
+        own = [[step[robot]] for step in reversed(done)]
+        path = fits.path_of_robots(int(fits.starts[0]), [robot], own)
+        assert path is not None, "the robot's automaton accepts its subplans only"
+        plan = space.path_with(start, [fits.labels_of(edge) for edge in path])
+        assert plan is not None, "plans with the sentence are plans of the task"
+        paths.append(plan)
+    names = tuple(task_language.partition.words[w] for w in words)
+    return describe_failure(space, Trail(start, tuple(zip(*paths, strict=True))), names)

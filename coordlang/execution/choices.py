@@ -19,8 +19,13 @@ import msgspec
 import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
-from coordlang.execution.automaton import Automaton, Knowledge, determinise
-from coordlang.execution.mixtures import Mixtures, walk_mixtures
+from coordlang.execution.automaton import (
+    Automaton,
+    Knowledge,
+    Mixtures,
+    determinise,
+    walk_mixtures,
+)
 from coordlang.execution.monitor import FORMAT, VERSION, EventMonitor, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe

@@ -115,27 +115,10 @@ class TooManyToCount(OutOfMemory):
     """A failure probability that would take more work than it is allowed."""
 
 
-@dataclass(frozen=True, slots=True)
-class FailureProbability:
-    """How often robots miscoordinate, exactly: ``tasks`` has one probability for each task."""
-
-    tasks: tuple[Fraction, ...]
-
-    @property
-    def mean(self) -> Fraction:
-        """The probability for a task drawn uniformly."""
-        return mean(self.tasks)
-
-    @property
-    def worst(self) -> Fraction:
-        """That of the task in which robots fail most often."""
-        return max(self.tasks)
-
-
 def failure_probability(
     spaces: Iterable[PlanSpace], words: Iterable[Ints | None], most: int = MOST
-) -> FailureProbability:
-    """Count how often robots miscoordinate in all tasks of some plan spaces.
+) -> tuple[Fraction, Fraction]:
+    """Count how often robots miscoordinate: in a task drawn uniformly, and in the worst one.
 
     ``words`` are for each of the ``spaces`` the word number of each node; None: silence.  Raises
     `TooManyToCount` beyond ``most`` additions.
@@ -144,7 +127,7 @@ def failure_probability(
     found: list[Fraction] = []
     for space, word in zip(spaces, words, strict=True):
         found += FailureCount(space, word, sets, most).tasks()
-    return FailureProbability(tuple(found))
+    return mean(found), max(found)
 
 
 def failure_of_sentence(
@@ -365,28 +348,23 @@ def failures(
     ``spaces``, ``words`` and ``most`` are as in `failure_probability`.
     """
     try:
-        found = failure_probability(spaces, words, most)
+        return Failures(*failure_probability(spaces, words, most))
     except TooManyToCount as error:
         return Failures(None, None, estimated_failure(spaces, words, _RUNS, seed=0), error.what)
-    return Failures(found.mean, found.worst)
 
 
-def failures_under(
-    partition: Partition, candidates: Candidates, *, is_claimed: bool = False, most: int = MOST
-) -> Failures:
+def failures_under(partition: Partition, candidates: Candidates, *, is_claimed: bool) -> Failures:
     """Count how often robots fail under words in all candidate tasks.
 
-    If it ``is_claimed`` by a language file it is counted whatever the work is, up to ``most``
+    If it ``is_claimed`` by a language file it is counted whatever the work is, up to `MOST`
     additions; else only where that takes seconds.
     """
-    if not is_claimed:
-        most = min(most, _QUICKLY)
-        if estimate(candidates.source).is_large:
-            return Failures(None, None, None, "there are too many tasks to do it at once")
+    if not is_claimed and estimate(candidates.source).is_large:
+        return Failures(None, None, None, "there are too many tasks to do it at once")
     try:
         spaces = candidates.spaces
         words = [partition.word_of(space.rows)[space.state] for space in spaces]
-        return failures(spaces, words, most)
+        return failures(spaces, words, MOST if is_claimed else _QUICKLY)
     except OutOfTime as error:
         stop_clock()
         return Failures(None, None, None, error.what)

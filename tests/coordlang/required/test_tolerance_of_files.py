@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -16,7 +15,6 @@ import pytest
 import coordlang as library
 from coordlang.language.file import to_bytes
 from coordlang.language.provenance import percent
-from coordlang.required.failure import failures_under
 from coordlang.verification.certificate_file import write_certificate
 from tests.support.command import Command
 from tests.support.domains import files_of
@@ -84,8 +82,8 @@ def test_what_cannot_be_counted_cannot_be_claimed(
     coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = silent(tmp_path / "l.json", SILENCE)
-    few = partial(failures_under, most=100)
-    monkeypatch.setattr("coordlang.commands.verify.failures_under", few)
+    for most in ("MOST", "_QUICKLY"):
+        monkeypatch.setattr(f"coordlang.required.failure.{most}", 100)
     found = coordlang("verify", path, *SQUARE)
     assert found.code == 22
     assert "what the language tolerates cannot be checked" in found.err
