@@ -15,7 +15,7 @@ from benchmarks.paper.reported import PLANNING_RATIO
 from benchmarks.paper.suite import METHODS, OTHERS, QUICK_ROW, ROW, WORLDS, language_for, method_of
 from benchmarks.paper.tables import elsewhere, table
 from benchmarks.paper.task_choices import languages_in_tasks
-from coordlang.execution.guided_search import ExpandedStates, plan_under_sentence
+from coordlang.execution.guided_search import plan_under_sentence
 from coordlang.execution.task_language import TaskLanguage
 from planners.joint.model import Goal, JointModel
 from planners.joint.states import TrueFacts
@@ -48,14 +48,13 @@ def run(unit: Unit, settings: Settings) -> Result:
     """Count the nodes that A* expands with one heuristic, with and without the sentences."""
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings.seed)
-    states = ExpandedStates(candidates.model, language.partition(candidates.model))
     tasks = list(languages_in_tasks(language, candidates))
     samples = unit.parameters["samples"]
     if samples is not None and samples < len(tasks):
         # The same tasks for every language and heuristic.
         tasks = Random(f"{settings.seed} {world.name}").sample(tasks, samples)
     bound = {**HEURISTICS, "manhattan": manhattan}[unit.parameters["heuristic"]]
-    counted = [expansions(task, bound, states) for task in tasks]
+    counted = [expansions(task, bound) for task in tasks]
     alone, pruned, bounded = (list(column) for column in zip(*counted, strict=True))
     return {
         "tasks": len(counted),
@@ -67,17 +66,15 @@ def run(unit: Unit, settings: Settings) -> Result:
     }
 
 
-def expansions(
-    language: TaskLanguage, bound: Bound, states: ExpandedStates
-) -> tuple[int, int, int]:
+def expansions(language: TaskLanguage, bound: Bound) -> tuple[int, int, int]:
     """Count the nodes that A* expands in one task.
 
     Without a sentence; with the sentence of the plan found, only pruning, as in the paper; and with
     the number of words left as a bound, too.
     """
-    alone = plan_under_sentence(language, None, bound, states)
-    pruned = plan_under_sentence(language, alone.words, bound, states, count_words=False)
-    bounded = plan_under_sentence(language, alone.words, bound, states)
+    alone = plan_under_sentence(language, None, bound)
+    pruned = plan_under_sentence(language, alone.words, bound, count_words=False)
+    bounded = plan_under_sentence(language, alone.words, bound)
     return alone.expanded, pruned.expanded, bounded.expanded
 
 

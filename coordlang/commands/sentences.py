@@ -15,7 +15,7 @@ from coordlang.commands.plans import OptimalPlans, PlanSteps, show_listed
 from coordlang.commands.records import PlanOptions, SayOptions, UnderstandOptions
 from coordlang.commands.terminal import covered_code, echo
 from coordlang.execution.best_sentence import Preference, best_sentence, read_preference
-from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
+from coordlang.execution.guided_search import GuidedPlan, plan_under_sentence
 from coordlang.execution.plan_sentence import PlanDag, sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
@@ -233,15 +233,14 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     preferences = [read_preference(used, text) for text in wishes_in(options.prefer)]
     best = best_sentence(used, preferences) if preferences else None
     words = best.words if best else used.words_of(sentence or ())
-    expanded = ExpandedStates(used.model, used.partition)
     bound = HEURISTICS[_BOUND]
-    found = plan_under_sentence(used, words, bound, expanded)
+    found = plan_under_sentence(used, words, bound)
     return PlanUnderSentence(
         used,
         used.text(words),
         texts(used.model.in_step, found.plan),
         found,
-        plan_under_sentence(used, None, bound, expanded),
+        plan_under_sentence(used, None, bound),
         tuple(_fulfilled(preferences, best.values)) if best else (),
         SentencePlans(used, words),
     )

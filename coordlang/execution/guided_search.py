@@ -5,17 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from heapq import heappop, heappush
 
 import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import sentence
-from coordlang.language.words import Partition
-from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
-from planners.search.goals import FAR, Values
+from planners.search.goals import FAR
 from planners.search.heuristics import HEURISTICS, Bound, heuristic
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
@@ -48,50 +45,18 @@ class GuidedPlan:
     generated: int
 
 
-class ExpandedStates:
-    """States met by searches with one language over one model, with their words and joint steps.
-
-    It only saves work: searches of many tasks, or with and without a sentence, expand the same
-    states.  ``rows`` and ``word`` are the states met so far and their word numbers, by number.
-    """
-
-    def __init__(self, model: JointModel, partition: Partition) -> None:
-        self.model, self.partition = model, partition
-        self.rows, self.word = list[Rows](), list[int]()
-        self._number: dict[bytes, int] = {}
-        #: The joint steps out of a state, (next state, labels, second cost), sorted by labels.
-        self.steps = cache(self._steps)
-
-    def numbers(self, rows: Rows) -> list[int]:
-        """The numbers of the states of a table, which get one if they have none yet."""
-        keys = [row.tobytes() for row in np.ascontiguousarray(rows)]
-        fresh = list({key: n for n, key in enumerate(keys) if key not in self._number}.values())
-        for n, word in zip(fresh, self.partition.word_of(rows[fresh]).tolist(), strict=True):
-            self._number[keys[n]] = len(self.rows)
-            self.rows.append(rows[n])
-            self.word.append(word)
-        return [self._number[key] for key in keys]
-
-    def _steps(self, state: int) -> list[tuple[int, tuple[int, ...], int]]:
-        found = self.model.successors(self.rows[state][None, :])
-        labels = [tuple(step) for step in found.labels.tolist()]
-        return list(zip(self.numbers(found.result), labels, found.cost.tolist(), strict=True))
-
-
 def plan_under_sentence(
     task_language: TaskLanguage,
     words: Sequence[int] | None,
     bound: Bound = HEURISTICS["relaxed"],
-    states: ExpandedStates | None = None,
     *,
     count_words: bool = True,
 ) -> GuidedPlan:
     """Find an optimal plan of the task with a sentence (word numbers); any optimal plan for None.
 
-    ``bound`` is admissible and consistent; ``states`` are what earlier searches
-    with the same language and model have expanded; for ``count_words`` see `_a_star`.  Of plans
-    within slack the earliest is read off the plan space, without a search, and of plans without a
-    common step the first one.  Raises `NoPlanFits`.
+    ``bound`` is admissible and consistent; for ``count_words`` see `_a_star`.  Of plans within
+    slack the earliest is read off the plan space, without a search, and of plans without a common
+    step the first one.  Raises `NoPlanFits`.
     """
     space, start = task_language.space, task_language.start
     fits = space if words is None else task_language.plans_with(words)  # raises if there is none
@@ -100,10 +65,7 @@ def plan_under_sentence(
         return _read_off(task_language, fits, begin, _earliest(fits, begin))
     if space.model.is_asynchronous:
         return _read_off(task_language, fits, begin, fits.first_path(begin))
-    states = states or ExpandedStates(task_language.model, task_language.partition)
-    goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
-    least = heuristic(bound, task_language.model, goal, init)
-    found = _a_star(states, init, goal, least, words, count_words)
+    found = _a_star(_States(task_language, words, bound), words, count_words)
     assert found.cost == space.cost_of(task_language.task), "A* is optimal"
     return found
 
@@ -136,14 +98,7 @@ def _earliest(space: PlanSpace, start: int) -> list[int]:
     return path
 
 
-def _a_star(
-    states: ExpandedStates,
-    init: Rows,
-    goal: Goal,
-    bound: Values,
-    words: Sequence[int] | None,
-    count_words: bool,
-) -> GuidedPlan:
+def _a_star(states: _States, words: Sequence[int] | None, count_words: bool) -> GuidedPlan:
     """Search for an optimal plan with a sentence that some optimal plan has.
 
     A node is a state, the *index* of its word in the sentence (0 without a sentence) and a cost.
@@ -153,14 +108,12 @@ def _a_star(
     so with ``count_words`` the number of words that are left is a lower bound, too (the paper only
     prunes).
 
-    Costs are lexicographic: steps, second component.  ``bound`` is an admissible, consistent lower
-    bound on the steps left.  The next node is one with least (steps + bound, second component),
-    then least bound, then the largest index, then the one whose predecessor was expanded last, then
-    the one with the smallest labels.
+    Costs are lexicographic: steps, second component.  The next node is one with least (steps +
+    bound, second component), then least bound, then the largest index, then the one whose
+    predecessor was expanded last, then the one with the smallest labels.
     """
-    (start,), last = states.numbers(init[None, :]), len(words or (0,)) - 1
-    height = {start: int(bound(init[None, :])[0])}  # the lower bound of every state met
-    best: dict[int, Cost] = {start: (0, 0)}
+    last = len(words or (0,)) - 1
+    best: dict[int, Cost] = {0: (0, 0)}
     ways: Ways = {}
     queue: list[tuple[Cost, int, int, int, int, Node]] = []
     expanded: list[int] = []
@@ -168,49 +121,76 @@ def _a_star(
     def put(node: Node, order: int) -> None:
         state, index, (steps, second) = node
         left = last - index
-        least = max(height[state], left) if count_words else height[state]
+        least = max(states.height[state], left if count_words else 0)
         heappush(queue, ((steps + least, second), least, left, -len(expanded), order, node))
 
-    put((start, 0, (0, 0)), 0)
+    put((0, 0, (0, 0)), 0)
     while queue:
         *_, node = heappop(queue)
         state, index, cost = node
         if cost != best[state]:
             continue
-        if index == last and states.model.holds(goal, states.rows[state][None, :])[0]:
+        if index == last and states.height[state] == 0:
             return _found(states, ways, node, expanded)
         expanded.append(state)
-        for order, to, labels in _hopeful(states, bound, height, [*_fitting(states, words, node)]):
+        for order, to, labels in states.steps(node):
             if to not in ways and to[2] <= best.get(to[0], to[2]):
                 best[to[0]], ways[to] = to[2], (node, labels)
                 put(to, order)
     raise AssertionError("some plan has the sentence")
 
 
-def _fitting(states: ExpandedStates, words: Sequence[int] | None, node: Node) -> Iterator[Step]:
-    """The joint steps out of a node that fit the sentence."""
-    state, index, (steps, second) = node
-    for number, (target, labels, cost) in enumerate(states.steps(state)):
-        goes_on = words is not None and states.word[target] != words[index]
-        if words is None or not goes_on or states.word[target] in words[index + 1 : index + 2]:
-            yield number, (target, index + goes_on, (steps + 1, second + cost)), labels
+class _States:
+    """The states that a search meets, by number: the initial one is 0.
+
+    ``rows`` are their rows, ``height`` lower bounds of the joint steps from each, 0 exactly where
+    the goal holds.
+    """
+
+    def __init__(
+        self, task_language: TaskLanguage, words: Sequence[int] | None, bound: Bound
+    ) -> None:
+        space, start = task_language.space, task_language.start
+        goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
+        self.model, self.partition, self._words = space.model, task_language.partition, words
+        self._bound = heuristic(bound, space.model, goal, init)
+        self.rows, self.height = list[Rows](), list[int]()
+        self._number: dict[bytes, int] = {}
+        self._numbers(init[None, :])
+
+    def _numbers(self, rows: Rows) -> list[int]:
+        """The numbers of the states of a table; those that are new are bounded at once."""
+        keys = [row.tobytes() for row in rows]
+        fresh = list({key: n for n, key in enumerate(keys) if key not in self._number}.values())
+        self.height += self._bound(rows[fresh]).tolist() if fresh else []
+        for n in fresh:
+            self._number[keys[n]] = len(self.rows)
+            self.rows.append(rows[n])
+        return [self._number[key] for key in keys]
+
+    def steps(self, node: Node) -> Iterator[Step]:
+        """The joint steps out of a node that fit the sentence and may lead to the goal."""
+        state, index, (steps, second) = node
+        found = self.model.successors(self.rows[state][None, :])
+        goes_on, kept = np.zeros(len(found.result), np.int64), np.arange(len(found.result))
+        if self._words is not None:
+            word = self.partition.word_of(found.result)
+            goes_on = (word != self._words[index]).astype(np.int64)
+            kept = np.flatnonzero(np.isin(word, self._words[index : index + 2]))
+        for number, target in zip(kept.tolist(), self._numbers(found.result[kept]), strict=True):
+            if self.height[target] < FAR:
+                cost = steps + 1, second + int(found.cost[number])
+                to = target, index + int(goes_on[number]), cost
+                yield number, to, tuple(found.labels[number].tolist())
 
 
-def _hopeful(
-    states: ExpandedStates, bound: Values, height: dict[int, int], steps: Sequence[Step]
-) -> list[Step]:
-    """The steps to states that may lead to the goal; states that are new are bounded at once."""
-    if fresh := sorted({to[0] for _, to, _ in steps} - height.keys()):
-        rows = np.stack([states.rows[state] for state in fresh])
-        height.update(zip(fresh, bound(rows).tolist(), strict=True))
-    return [step for step in steps if height[step[1][0]] < FAR]
-
-
-def _found(states: ExpandedStates, ways: Ways, node: Node, expanded: Sequence[int]) -> GuidedPlan:
-    cost, plan, passed = node[2], [], [states.word[node[0]]]
+def _found(states: _States, ways: Ways, node: Node, expanded: Sequence[int]) -> GuidedPlan:
+    cost, plan, passed = node[2], [], [node[0]]
     while node in ways:
         node, labels = ways[node]
         plan.append(labels)
-        passed.append(states.word[node[0]])
+        passed.append(node[0])
+    rows = np.stack([states.rows[state] for state in reversed(passed)])
+    words = sentence(states.partition.word_of(rows).tolist())
     work = len(expanded), len({*expanded}), len(ways) + 1
-    return GuidedPlan(tuple(reversed(plan)), sentence(reversed(passed)), cost, *work)
+    return GuidedPlan(tuple(reversed(plan)), words, cost, *work)
