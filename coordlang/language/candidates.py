@@ -259,11 +259,10 @@ def _listed_one_by_one(
             "is not checked",
             position=position,
         )
-    plans: dict[Goal, list[PlanSpace]] = {}
 
     def found(number: int) -> PlanSpace:
         try:
-            return _search_once(loaded.model, tasks[number], plans)
+            return search(loaded.model, tasks[number])
         except ProvedImpossible as error:
             raise _unsolvable(number, listed[number], position, error.remedy) from None
 
@@ -293,25 +292,6 @@ def _one_by_one(
             skipped.append(name)
     source = Searched(as_executed(joined(spaces)))
     return Candidates(kind, loaded, source, listed=tuple(kept), skipped=tuple(skipped))
-
-
-def _search_once(
-    model: JointModel, task: PlanningTask, found: dict[Goal, list[PlanSpace]]
-) -> PlanSpace:
-    """The plan space of a task: part of one that was found before, if it starts on plans there.
-
-    From a state on an optimal plan the plan space holds all optimal plans to that goal; with slack,
-    plans of another task may have used some of it.
-    """
-    if model.slack:
-        return search(model, task)
-    for space in found.setdefault(task.goal, []):
-        state = int(find_rows(space.rows, task.init[None, :])[0])
-        for node in np.flatnonzero(space.state == state)[:1].tolist():
-            cost = int(space.cost[space.first_path(node)].sum())
-            return space.with_tasks(np.array([node]), np.array([cost]))
-    found[task.goal].append(search(model, task))
-    return found[task.goal][-1]
 
 
 def _texts(task: ListedTask) -> tuple[str, str]:
