@@ -33,17 +33,14 @@ END = 0
 
 
 class LabelSets:
-    """All sets of label sequences that were met, by number.
+    """All sets of label sequences that were met, by number; equal sets have one number.
 
-    Numbers are nodes of a trie over moves ``(label, what follows)`` in the order of labels, so each
-    beginning of a set's moves is a set too.  All sequences of a set have one length.
+    All sequences of a set have one length.
     """
 
     def __init__(self) -> None:
-        self._child: dict[tuple[int, int, int], int] = {}
-        self._parent: list[tuple[int, int, int]] = [(END, -1, -1)]
-        #: Made when it is asked for: those of all beginnings would grow by the square.
-        self._moves: list[dict[int, int] | None] = [{}]
+        self._moves: list[dict[int, int]] = [{}]
+        self._number: dict[tuple[tuple[int, int], ...], int] = {(): END}
         self._union: dict[tuple[int, int], int] = {}
         self._within: dict[tuple[int, int], bool] = {}
         self._sizes = {END: 1}
@@ -53,31 +50,15 @@ class LabelSets:
 
     def moves(self, number: int) -> dict[int, int]:
         """Each first label of a set with the number of the set of what follows it."""
-        found = self._moves[number]
-        if found is None:
-            path = []
-            at = number
-            while at != END:
-                at, label, after = self._parent[at]
-                path.append((label, after))
-            found = self._moves[number] = dict(reversed(path))
-        return found
+        return self._moves[number]
 
     def of_moves(self, moves: dict[int, int]) -> int:
         """The number of the set with these moves."""
-        number = END
-        for label in sorted(moves):
-            number = self._extended(number, label, moves[label])
+        key = tuple(sorted(moves.items()))
+        number = self._number.setdefault(key, len(self._moves))
+        if number == len(self._moves):
+            self._moves.append(dict(key))
         return number
-
-    def _extended(self, number: int, label: int, after: int) -> int:
-        key = (number, label, after)
-        known = self._child.get(key)
-        if known is None:
-            known = self._child[key] = len(self._parent)
-            self._parent.append(key)
-            self._moves.append(None)
-        return known
 
     def union(self, one: int, other: int) -> int:
         """The union of two sets of sequences of one length."""
@@ -120,8 +101,6 @@ class LabelSets:
         for label, after in self.moves(number).items():
             yield from ((label, *rest) for rest in self.sequences(after))
 
-    # ---- many at once
-
     def unions(self, first: Ints, sizes: Ints, members: Ints) -> Ints:
         """For each group, ``members[first : first + size]``, the union of its sets."""
         result = members[first].copy()
@@ -129,16 +108,6 @@ class LabelSets:
             open_groups = np.flatnonzero(sizes > position)
             pairs = np.column_stack((result[open_groups], members[first[open_groups] + position]))
             result[open_groups] = of_each_row(pairs, self.union)
-        return result
-
-    def sets(self, first: Ints, sizes: Ints, labels: Ints, after: Ints) -> Ints:
-        """For each group of moves, sorted by label, the set that has them."""
-        result = np.full(len(first), END, np.int64)
-        for position in range(int(sizes.max(initial=0))):
-            open_groups = np.flatnonzero(sizes > position)
-            at = first[open_groups] + position
-            rows = np.column_stack((result[open_groups], labels[at], after[at]))
-            result[open_groups] = of_each_row(rows, self._extended)
         return result
 
 
@@ -200,7 +169,9 @@ class Choices:
         following = self.sets.unions(first, np.diff(np.append(first, len(rows))), rows[:, 2])
         groups = rows[first]
         _, start, sizes = np.unique(groups[:, 0], return_index=True, return_counts=True)
-        here = self.sets.sets(start, sizes, groups[:, 1], following)
+        pairs = list(zip(groups[:, 1].tolist(), following.tolist(), strict=True))
+        own = (dict(pairs[at : at + size]) for at, size in zip(start, sizes, strict=True))
+        here = np.fromiter(map(self.sets.of_moves, own), np.int64, len(start))
         group_of_row = np.cumsum(fresh) - 1
         return here, sizes, following[group_of_row[inverse]]
 
