@@ -54,10 +54,13 @@ class LabelSets:
 
     def of_moves(self, moves: dict[int, int]) -> int:
         """The number of the set with these moves."""
-        key = tuple(sorted(moves.items()))
-        number = self._number.setdefault(key, len(self._moves))
+        return self.of_sorted(tuple(sorted(moves.items())))
+
+    def of_sorted(self, moves: tuple[tuple[int, int], ...]) -> int:
+        """The same for moves that are sorted by label."""
+        number = self._number.setdefault(moves, len(self._moves))
         if number == len(self._moves):
-            self._moves.append(dict(key))
+            self._moves.append(dict(moves))
         return number
 
     def union(self, one: int, other: int) -> int:
@@ -169,9 +172,10 @@ class Choices:
         following = self.sets.unions(first, np.diff(np.append(first, len(rows))), rows[:, 2])
         groups = rows[first]
         _, start, sizes = np.unique(groups[:, 0], return_index=True, return_counts=True)
-        pairs = list(zip(groups[:, 1].tolist(), following.tolist(), strict=True))
-        own = (dict(pairs[at : at + size]) for at, size in zip(start, sizes, strict=True))
-        here = np.fromiter(map(self.sets.of_moves, own), np.int64, len(start))
+        pairs = tuple(zip(groups[:, 1].tolist(), following.tolist(), strict=True))
+        ends = (start + sizes).tolist()
+        own = map(pairs.__getitem__, map(slice, start.tolist(), ends))
+        here = np.array([*map(self.sets.of_sorted, own)], np.int64)
         group_of_row = np.cumsum(fresh) - 1
         return here, sizes, following[group_of_row[inverse]]
 
