@@ -72,8 +72,7 @@ class LabelSets:
         if known is None:
             together = dict(self.moves(one))
             for label, after in self.moves(other).items():
-                mine = together.get(label)
-                together[label] = after if mine is None else self.union(mine, after)
+                together[label] = self.union(together.get(label, after), after)
             known = self._union[key] = self.of_moves(together)
         return known
 

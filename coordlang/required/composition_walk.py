@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,24 +35,13 @@ _PIECE = 1_000_000
 _MOST = 1e10
 
 
-class Moves(NamedTuple):
-    """Edges of a walk out of a table of nodes.
-
-    ``source`` (k) numbers in the table, ``edges`` (k, robots) the plan-space edge that each plan
-    takes, ``targets`` (k, robots + 1) the walk nodes that they lead to: where the mixture breaks
-    its node is the number of nodes of the plan space, from which no edges lead.
-    """
-
-    source: Ints
-    edges: Ints
-    targets: Ints
-
-
-def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints) -> Iterator[Moves]:
+def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints) -> Iterator[tuple[Ints, Ints, Ints]]:
     """All moves of n plans and their mixture out of walk nodes ``(x_1 .. x_n, y)``, in chunks.
 
-    There is one for every choice of the plans' next steps.  Raises `OutOfMemory` where these are
-    hours of work, or one node needs too much at once.
+    One for every choice of the plans' next steps: (k) its row in ``nodes``, (k, robots) the edge
+    that each plan takes, (k, robots + 1) the node that they lead to, where a mixture that breaks is
+    at the number of nodes of the plan space.  Raises `OutOfMemory` where these are hours of work,
+    or one node needs too much at once.
     """
     robots = nodes.shape[1] - 1
     sizes = move_counts(space, nodes[:, :-1])
@@ -69,7 +57,7 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints) -> Iterator[Moves]:
             prefix = index.follow(robot, prefix, space.robot_labels(robot, edge))
         edges, mixed = np.stack(columns, axis=1), np.full(len(source), len(space))
         mixed[prefix >= 0] = space.targets(prefix[prefix >= 0])
-        yield Moves(source, edges, np.column_stack((space.targets(edges), mixed)))
+        yield source, edges, np.column_stack((space.targets(edges), mixed))
 
 
 def move_counts(space: PlanSpace, plans: Ints) -> NDArray[np.float64]:
