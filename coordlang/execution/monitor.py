@@ -140,7 +140,7 @@ class Monitor:
         self.atoms = _text(entry, "atoms", where)
         if self.atoms not in ("exact", "own"):
             raise _broken(f"{where}: 'atoms' is {_shown(self.atoms)}, not exact or own")
-        facts, others = (_atoms(entry, key, where) for key in ("facts", "others"))
+        facts, others = (_nested(entry, key, where, list) for key in ("facts", "others"))
         #: Every atom, and what is known of it in a state that does not mention it.
         self._atoms = {**dict.fromkeys(facts, False), **dict.fromkeys(sorted(others))}
         if len(self._atoms) < len(facts) + len(others):
@@ -218,7 +218,7 @@ class Monitor:
 
     def known(self, atom: str) -> bool | None:
         """Whether an atom is true now, whatever the others did; None if that depends on them."""
-        text = atom if isinstance(atom, str) and atom in self._atoms else _plain(atom)
+        text = _plain(atom)
         self._check_atom(text)
         return self._value(self._here, text)
 
@@ -358,7 +358,8 @@ class EventMonitor(Monitor):
             for text, event in _get(record, "events", dict, where).items()
         }
         #: Own subaction -> other robot -> its subactions that interfere with it.
-        self._interferes = _interferes(record, where)
+        self._interferes: dict[str, dict[str, list[str]]]
+        self._interferes = _nested(record, "interferes", where, dict, dict, list)
         for number, state in enumerate(_get(entry, "states", list, where)):
             for text in _get(state, "next", dict, f"state {number}"):
                 if text != IDLE and text not in self._events:
@@ -510,28 +511,13 @@ def drawn(monitor: Monitor, random: Random, allowed: Sequence[str | None]) -> st
 
 
 def _own_event(record: Any, others: Mapping[str, Any], where: str) -> _OwnEvent:
-    after, meets = _get(record, "after", dict, where), _get(record, "with", dict, where)
-    for robot in after:
-        _get(after, robot, int, f"{where}: 'after'")
-    for robot in meets:
-        _check_plain(meets[robot], f"{where}: 'with'")
+    after, meets = _nested(record, "after", where, dict, int), _get(record, "with", dict, where)
+    _check_inside(meets.values(), (), f"{where}: 'with'")
     subaction = _text(record, "subaction", where)
     _check_plain(subaction, where)
     if lost := (after.keys() | meets.keys()) - others.keys():
         raise _broken(f"{where} waits for {_shown(min(lost))}: no such robot")
     return _OwnEvent(subaction, after, meets)
-
-
-def _interferes(record: Mapping[str, Any], where: str) -> dict[str, dict[str, list[str]]]:
-    """For each own subaction the subactions of other robots that interfere with it."""
-    found: dict[str, dict[str, list[str]]] = _get(record, "interferes", dict, where)
-    inside = f"{where}: 'interferes'"
-    for own in found:
-        by_robot = _get(found, own, dict, inside)
-        for robot in by_robot:
-            for text in _get(by_robot, robot, list, inside):
-                _check_plain(text, inside)
-    return found
 
 
 def _others(record: Mapping[str, Any], where: str) -> dict[str, list[dict[str, int]]]:
@@ -541,9 +527,8 @@ def _others(record: Mapping[str, Any], where: str) -> dict[str, list[dict[str, i
         for event in _get(others, robot, list, f"{where}: 'others'"):
             if not isinstance(event, Mapping):
                 raise _broken(f"{where}: an event of {_shown(robot)} is {_shown(event)}")
-            for text in event:
-                _check_plain(text, f"{where}: 'others'")
-                _get(event, text, int, f"{where}: 'others'")
+            for kinds in ((), (int,)):
+                _check_inside(event, kinds, f"{where}: 'others'")
     return others
 
 
@@ -630,11 +615,19 @@ def _text(record: Any, key: str, where: str) -> str:
     return text
 
 
-def _atoms(entry: Mapping[str, Any], key: str, where: str) -> list[str]:
-    atoms = _get(entry, key, list, where)
-    for atom in atoms:
-        _check_plain(atom, f"{where}: '{key}'")
-    return atoms
+def _nested(record: Any, key: str, where: str, *kinds: type[Any]) -> Any:
+    """The value of a key, checked down through containers to numbers, or to plain texts."""
+    value = _get(record, key, kinds[0], where)
+    _check_inside(value, kinds[1:], f"{where}: '{key}'")
+    return value
+
+
+def _check_inside(value: Iterable[Any], kinds: Sequence[type[Any]], where: str) -> None:
+    for key in value:
+        if not kinds:
+            _check_plain(key, where)
+        elif not _is_number(inner := _get(value, key, kinds[0], where)):
+            _check_inside(inner, kinds[1:], where)
 
 
 def _check_plain(text: Any, where: str) -> None:
