@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -103,12 +103,8 @@ def from_problems(
     listed = [listed_task(domain, problem, task) for problem, task in pairs]
     numbers = first_of_equal(listed)
     listed = [listed[number] for number in numbers]
-    names = [problems[number].source.name for number in numbers]
-
-    def found(number: int) -> PlanSpace:
-        return search(loaded.model, loaded.tasks[numbers[number]])
-
-    return _one_by_one("problems", loaded, listed, names, found, skip_unsolvable)
+    tasks = [loaded.tasks[number] for number in numbers]
+    return _one_by_one("problems", loaded, listed, tasks, None, skip_unsolvable)
 
 
 def all_pairs(
@@ -169,7 +165,8 @@ def from_listed(
     space = explored_if_small(model, starts)
     if space is None:
         _refuse_first(_surely_unreachable(model, starts, inits), loaded, inits, position)
-        return _listed_one_by_one(loaded, listed, tasks, position, skip_unsolvable)
+        _note_unchecked(loaded, tasks, position)
+        return _one_by_one("file", loaded, listed, tasks, position, skip_unsolvable)
     reached, _ = unique_rows(model.codec.facts_part(space.rows))
     unreachable = find_rows(reached, model.codec.facts_part(inits)) < 0
     _refuse_first(unreachable, loaded, inits, position)
@@ -243,14 +240,10 @@ def _surely_unreachable(model: JointModel, starts: Rows, inits: Rows) -> Bools:
     return ~possible
 
 
-def _listed_one_by_one(
-    loaded: PlanningInstance,
-    listed: Sequence[ListedTask],
-    tasks: Sequence[PlanningTask],
-    position: Position | None,
-    skip_unsolvable: bool,
-) -> Candidates:
-    """Listed tasks in a large space, each searched by itself, see `from_listed`."""
+def _note_unchecked(
+    loaded: PlanningInstance, tasks: Sequence[PlanningTask], position: Position | None
+) -> None:
+    """Say how many listed tasks start where it is not checked that the problem comes there."""
     known = {task.init.tobytes() for task in loaded.tasks}
     if unknown := sum(task.init.tobytes() not in known for task in tasks):
         note(
@@ -260,36 +253,30 @@ def _listed_one_by_one(
             position=position,
         )
 
-    def found(number: int) -> PlanSpace:
-        try:
-            return search(loaded.model, tasks[number])
-        except ProvedImpossible as error:
-            raise _unsolvable(number, listed[number], position, error.remedy) from None
-
-    names = [_named(number, task) for number, task in enumerate(listed)]
-    return _one_by_one("file", loaded, listed, names, found, skip_unsolvable)
-
 
 def _one_by_one(
     kind: Kind,
     loaded: PlanningInstance,
     listed: Sequence[ListedTask],
-    names: Sequence[str],
-    found: Callable[[int], PlanSpace],
-    skip_unsolvable: bool,
+    tasks: Sequence[PlanningTask],
+    position: Position | None,
+    skip_unsolvable: bool = False,
 ) -> Candidates:
-    """Tasks searched by number; those without a plan are left out if they may be, but for one."""
+    """Each task searched by itself; those without a plan are left out if they may be, but one."""
     kept: list[ListedTask] = []
     spaces: list[PlanSpace] = []
     skipped: list[str] = []
-    for number, (text, name) in enumerate(zip(listed, names, strict=True)):
+    for number, (text, task) in enumerate(zip(listed, tasks, strict=True)):
         try:
-            spaces.append(found(number))
+            spaces.append(search(loaded.model, task))
             kept.append(text)
-        except ProvedImpossible:
-            if not skip_unsolvable or len(skipped) == len(names) - 1:
+        except ProvedImpossible as error:
+            if skip_unsolvable and len(skipped) < len(tasks) - 1:
+                skipped.append(task.position.file if task.position else _named(number, text))
+            elif kind == "file":
+                raise _unsolvable(number, text, position, error.remedy) from None
+            else:
                 raise
-            skipped.append(name)
     source = Searched(as_executed(joined(spaces)))
     return Candidates(kind, loaded, source, listed=tuple(kept), skipped=tuple(skipped))
 
@@ -322,8 +309,7 @@ def from_recorded(
 ) -> Candidates:
     """Problems' tasks as a language file records them, searched one by one."""
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
-    source = Searched(as_executed(joined([search(loaded.model, task) for task in tasks])))
-    return Candidates("problems", loaded, source, listed=tuple(listed))
+    return _one_by_one("problems", loaded, listed, tasks, position)
 
 
 def describe(space: PlanSpace, task: int) -> str:
