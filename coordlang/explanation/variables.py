@@ -225,19 +225,15 @@ def _candidates(atoms: Sequence[Atom], holds: Bools) -> Iterator[_Group]:
     The latter are two or three of different predicates, as ``(holds r b)`` and ``(free r)`` are: of
     these exactly one is true for each key.
     """
-    shapes = _by_shape(atoms)
-    weights = holds.astype(np.float32)
-    together = (weights.T @ weights).astype(np.int64)
-    incomplete = []
+    shapes, incomplete = _by_shape(atoms), []
     for shape in sorted(shapes):
-        groups = list(_groups((shape,), shapes, together, len(holds)))
+        groups = list(_groups((shape,), shapes, holds))
         yield from groups
         if shape[1] and all(g.exclusive for g in groups) and not all(g.exhaustive for g in groups):
             incomplete.append(shape)
     for family in _families(incomplete):
-        found = _groups(family, shapes, together, len(holds))
-        if all(group.exhaustive for group in found):  # mostly the first one is not
-            yield from _groups(family, shapes, together, len(holds))
+        if all(group.exhaustive for group in _groups(family, shapes, holds)):
+            yield from _groups(family, shapes, holds)
 
 
 def _families(shapes: Sequence[_Shape]) -> Iterator[tuple[_Shape, ...]]:
@@ -251,13 +247,10 @@ def _families(shapes: Sequence[_Shape]) -> Iterator[tuple[_Shape, ...]]:
 def _groups(
     family: tuple[_Shape, ...],
     shapes: Mapping[_Shape, Mapping[tuple[str, ...], list[int]]],
-    together: Ints,
-    states: int,
+    holds: Bools,
 ) -> Iterator[_Group]:
-    """The atoms of some shapes, by key; ``together``: in how many ``states`` two atoms are true."""
+    """The atoms of some shapes, by key."""
     for key in sorted({key for shape in family for key in shapes[shape]}):
         own = [number for shape in family for number in shapes[shape].get(key, ())]
-        true = together[np.ix_(own, own)]
-        alone = np.trace(true)
-        exclusive = bool(true.sum() == alone)
-        yield _Group(family, key, own, exclusive, exclusive and bool(alone == states))
+        true = holds[:, own].sum(axis=1)
+        yield _Group(family, key, own, bool((true <= 1).all()), bool((true == 1).all()))

@@ -64,9 +64,6 @@ class Expression:
 
     def __call__(self, states: States) -> Any:
         """Its values: one for each state, or for each state and object."""
-        return self._read(states)
-
-    def _read(self, states: States) -> Any:
         raise NotImplementedError
 
 
@@ -104,8 +101,7 @@ class Role(Expression):
         world = states.world
         if self.predicate in world.relations:
             linked = world.get(links, self.predicate).astype(np.float32)
-            reached: Bools = members.astype(np.float32) @ (linked if self.inverse else linked.T) > 0
-            return reached
+            return members.astype(np.float32) @ (linked if self.inverse else linked.T) > 0
         found = np.zeros_like(members)
         state, *ends = states.atoms(self.predicate, 2)
         one, other = reversed(ends) if self.inverse else ends
@@ -123,7 +119,7 @@ class Everything(Expression):
     def __str__(self) -> str:
         return "all"
 
-    def _read(self, states: States) -> Bools:
+    def __call__(self, states: States) -> Bools:
         return np.ones((len(states), len(states.world.objects)), bool)
 
 
@@ -137,7 +133,7 @@ class Named(Expression):
     def __str__(self) -> str:
         return self.name
 
-    def _read(self, states: States) -> Bools:
+    def __call__(self, states: States) -> Bools:
         world = states.world
         found = np.zeros((len(states), len(world.objects)), bool)
         found[:, [world.number[name] for name in world.types.get(self.name, ())]] = True
@@ -153,7 +149,7 @@ class One(Expression):
     FORMS = ("{{{}}}", "{}")
     name: str
 
-    def _read(self, states: States) -> Bools:
+    def __call__(self, states: States) -> Bools:
         own = np.array([name == self.name for name in states.world.objects], bool)
         return np.tile(own, (len(states), 1))
 
@@ -166,9 +162,8 @@ class Without(Expression):
     FORMS = ("not {}", "not {}")
     concept: Concept
 
-    def _read(self, states: States) -> Bools:
-        others: Bools = ~states.get(self.concept)
-        return others
+    def __call__(self, states: States) -> Bools:
+        return ~states.get(self.concept)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,9 +175,8 @@ class Both(Expression):
     one: Concept
     other: Concept
 
-    def _read(self, states: States) -> Bools:
-        common: Bools = states.get(self.one) & states.get(self.other)
-        return common
+    def __call__(self, states: States) -> Bools:
+        return states.get(self.one) & states.get(self.other)
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +193,7 @@ class Some(Expression):
         """That of its parts."""
         return self.role.complexity + self.concept.complexity
 
-    def _read(self, states: States) -> Bools:
+    def __call__(self, states: States) -> Bools:
         return self.role.some(states, states.get(self.concept))
 
 
@@ -225,7 +219,7 @@ class Term(Expression):
         """One, and one more for the other direction."""
         return 1 + self.inverse
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         return states.image(self.predicate, self.named, self.inverse)
 
 
@@ -240,10 +234,9 @@ class Attribute(Expression):
     def __str__(self) -> str:
         return f"({self.name} {self.relation + ' ' if self.relation else ''}{self.term})"
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         known = states.world.get(attribute, self.name, self.relation)
-        number: Ints = np.append(known, NONE)[states.get(self.term)]
-        return number
+        return np.append(known, NONE)[states.get(self.term)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,7 +249,7 @@ class Distance(Expression):
     one: Term
     other: Term
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         here, there = states.get(self.one), states.get(self.other)
         far = states.world.get(distances, self.relation)[here, there]
         return np.where((here == NONE) | (there == NONE), NONE, far)
@@ -277,7 +270,7 @@ class Count(Expression):
         """One, and one more for each object that is named."""
         return 1 + sum(arg != ANY for arg in self.args)
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         return states.count(self.predicate, self.args)
 
 
@@ -289,7 +282,7 @@ class Size(Expression):
     FORMS = ("|{}|", "the number of objects that are {}")
     concept: Concept
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         size: Ints = states.get(self.concept).sum(axis=1)
         return size
 
@@ -307,9 +300,8 @@ class Gap(Expression):
     one: Concept
     other: Concept
 
-    def _read(self, states: States) -> Ints:
-        here: Bools = states.get(self.one)
-        there: Bools = states.get(self.other)
+    def __call__(self, states: States) -> Ints:
+        here, there = states.get(self.one), states.get(self.other)
         far = states.world.get(distances, self.relation)
         never = len(far) + 1
         far = np.where(far == NONE, never, far)
@@ -342,7 +334,7 @@ class Sign(Expression):
     def __str__(self) -> str:
         return f"(sign (- {self.one} {self.other}))"
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
         return _defined(np.sign(one - other), one, other)
 
@@ -361,7 +353,7 @@ class Residue(Expression):
         """That of the number, and the modulus."""
         return self.number.complexity + self.modulus
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         number = states.get(self.number)
         return _defined(number % self.modulus, number)
 
@@ -380,7 +372,7 @@ class Least(Expression):
         """That of the number, and twice the most: what is large in small problems is nothing."""
         return self.number.complexity + 2 * self.most
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         number = states.get(self.number)
         return _defined(np.minimum(number, self.most), number)
 
@@ -394,7 +386,7 @@ class Same(Expression):
     one: Term
     other: Term
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
         return _defined(one == other, one, other)
 
