@@ -29,7 +29,6 @@ from coordlang.lifted import language as lifted_file
 from coordlang.lifted.features import english, formula
 from coordlang.lifted.language import Known, LiftedLanguage, Verified, grounded
 from coordlang.lifted.learning import Instance, Learned, learn
-from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
 from coordlang.verification.by_definition import verify_candidates
 from planners.parallel.workers import Workers
@@ -212,7 +211,7 @@ def ground_in(
     candidates = files.candidates(tasks, files.options_of(shape))
     require_solvable(candidates)
     lifted_file.require_robots(lifted, candidates.model.robots, position)
-    states = States(World.loaded(candidates.loaded, points), candidates.rows)
+    states = Instance(candidates, points).states
     known: Known = "unknown"
     if is_verified:
         try:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, combinations, cycle, pairwise
+from itertools import chain, combinations, pairwise
 from typing import Any, Literal
 
 import msgspec
@@ -15,18 +15,17 @@ import numpy as np
 from coordlang.explanation.words import Cover
 from coordlang.language.words import Partition
 from coordlang.required.choices import Choices
-from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, own_text
 from planners.joint.tables import Bools, Ints, find_rows
 from planners.pddl.robots import natural
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 
-#: States at once at which it is computed which robots decide the next word.
-_STATES = 500
-
 #: Subplans of a robot that are listed one by one.
 FEW = 12
+
+#: States at once at which it is computed which robots decide the next word.
+_STATES = 500
 
 #: A robot's subplan: the text of its subaction in each step, None for idling; or of its events.
 Subplan = list[str | None]
@@ -264,24 +263,23 @@ def _deciding(
     """
     if space.model.slack_facts:
         return tuple(sorted(order))
-    groups = (some for size in range(len(order) + 1) for some in combinations(order, size))
-    robots, agreeing = next(groups), 0
-    for start in cycle(range(0, len(states), _STATES)):
+    parts = []
+    for start in range(0, len(states), _STATES):
         steps = space.model.successors(space.rows[states[start : start + _STATES]])
         kept = find_rows(partition.rows, steps.result) >= 0
         kept |= find_rows(space.rows, steps.result) >= 0
-        source, labels = steps.source[kept], steps.labels[kept]
         changes = partition.word_of(steps.result[kept]) == after
-        while len(robots) < len(order) and not _settle(changes, source, labels[:, robots]):
-            robots, agreeing = next(groups), 0
-        agreeing += 1
-        if agreeing * _STATES >= len(states):
-            break
-    return tuple(sorted(robots))
+        parts.append((changes, np.column_stack((steps.source, steps.labels))[kept]))
+    groups = (some for size in range(len(order)) for some in combinations(order, size))
+    deciding = (some for some in groups if all(_settle(*part, some) for part in parts))
+    return tuple(sorted(next(deciding, order)))
 
 
-def _settle(changes: Bools, source: Ints, labels: Labels) -> bool:
-    """Whether of all joint steps from one state in which robots do the same each one changes."""
-    seen = np.column_stack((source, labels))
+def _settle(changes: Bools, steps: Ints, robots: Sequence[int]) -> bool:
+    """Whether of all joint steps from one state in which robots do the same each one changes.
+
+    ``steps``: the state, and then each robot's label.
+    """
+    seen = steps[:, [0, *(1 + robot for robot in robots)]]
     _, first, inverse = np.unique(seen, axis=0, return_index=True, return_inverse=True)
     return bool((changes == changes[first][inverse.reshape(-1)]).all())

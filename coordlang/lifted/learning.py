@@ -182,7 +182,9 @@ class Instance:
     @cached_property
     def states(self) -> States:
         """The states on plans of the candidate tasks."""
-        return States(World.loaded(self.candidates.loaded, self.points), self.candidates.rows)
+        found = self.candidates.loaded
+        world = World(found.domain, found.problems[0], found.model, self.points)
+        return States(world, self.candidates.rows)
 
     def holds(
         self, words: Ints, workers: Workers | None = None, progress: Progress = lambda _: None
@@ -197,18 +199,17 @@ class Instance:
 class Learned:
     """Features of which the words of a language are functions.
 
-    ``features`` in the order of their complexity; ``word`` is the number of the word for the
-    features' values, for those that occur; ``proved``: fewer words do not suffice, as functions of
-    these features.  ``sizes`` are for each problem, known ones first, the numbers of states, tasks
-    and words.  ``tried`` counts the features looked at (with the concepts and numbers of which they
-    are made), ``pool`` those of them that differ, ``rounds`` how often classes were refuted,
-    ``taken`` the problems learned from: the known ones, and those held back that refuted what had
-    been learned.  ``stopped`` is what ended the search for fewer words, or None: the words are
-    verified all the same.
+    ``features`` in the order of their complexity; ``values`` are the features' values that occur ->
+    word, by name; ``proved``: fewer words do not suffice, as functions of these features. ``sizes``
+    are for each problem, known ones first, the numbers of states, tasks and words. ``tried`` counts
+    the features looked at (with the concepts and numbers of which they are made), ``pool`` those of
+    them that differ, ``rounds`` how often classes were refuted, ``taken`` the problems learned
+    from: the known ones, and those held back that refuted what had been learned. ``stopped`` is
+    what ended the search for fewer words, or None: the words are verified all the same.
     """
 
     features: tuple[Feature, ...]
-    word: Mapping[Vector, int]
+    values: Mapping[Vector, str]
     proved: bool
     sizes: tuple[tuple[int, int, int], ...]
     tried: int
@@ -220,13 +221,7 @@ class Learned:
     @property
     def words(self) -> tuple[str, ...]:
         """The words' names, by number."""
-        return tuple(f"w{k}" for k in range(len(set(self.word.values()))))
-
-    @property
-    def values(self) -> Mapping[Vector, str]:
-        """The features' values -> word, by name."""
-        words = self.words
-        return {vector: words[number] for vector, number in self.word.items()}
+        return tuple(f"w{k}" for k in range(len(set(self.values.values()))))
 
 
 def learn(
@@ -374,14 +369,15 @@ class _Learner:
             words, proved = merge_classes(len(table), known, self._progress)
         renumbered = {word: k for k, word in enumerate(dict.fromkeys(words))}
         of_class = np.array([renumbered[word] for word in words], np.int64)
-        word = dict(zip(map(tuple, table.tolist()), of_class.tolist(), strict=True))
+        names = (f"w{k}" for k in of_class.tolist())
+        named = dict(zip(map(tuple, table.tolist()), names, strict=True))
         of_states = [of_class[own] for own in classes]
         sizes = tuple(
             (len(own.states), own.candidates.count, len(np.unique(words)))
             for own, words in zip(every, of_states, strict=True)
         )
         tried, pool = self._pool.tried, len(self._pool.features)
-        return Learned(features, word, proved, sizes, tried, pool), of_states
+        return Learned(features, named, proved, sizes, tried, pool), of_states
 
     def _choose(self, excluded: Sequence[int]) -> list[int]:
         """The simplest features that nothing refutes in the problems that were taken."""

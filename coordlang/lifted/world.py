@@ -19,7 +19,6 @@ from coordlang.sites.coordinates import Point, from_names
 from planners.joint.model import JointModel
 from planners.joint.states import TrueFacts
 from planners.joint.tables import Bools, Ints, Rows
-from planners.loading import PlanningInstance
 from planners.pddl.lifted import Domain, Problem, supertypes
 from planners.pddl.robots import static_atoms
 from planners.search.graphs import csgraph
@@ -60,7 +59,7 @@ class World(Asked):
         domain: Domain,
         problem: Problem,
         model: JointModel,
-        points: Mapping[str, Point] | None = None,
+        points: Mapping[str, Point],
     ) -> None:
         self.model, self.robots = model, model.robots
         self.objects = tuple(sorted(problem.objects))
@@ -73,14 +72,9 @@ class World(Asked):
             for kind in {t for each in own for t in supertypes(domain.types, each)}:
                 types.setdefault(kind, set()).add(name)
         self.types = dict(sorted(types.items()))
-        given = {n: p for n, p in (points or {}).items() if n in problem.objects}
+        given = {name: point for name, point in points.items() if name in problem.objects}
         self.points = _points(self.relations, given)
         self.known: dict[object, Any] = {}
-
-    @classmethod
-    def loaded(cls, loaded: PlanningInstance, points: Mapping[str, Point] | None = None) -> World:
-        """The world of a loaded problem."""
-        return cls(loaded.domain, loaded.problems[0], loaded.model, points)
 
     @cached_property
     def number(self) -> Mapping[str, int]:
@@ -165,7 +159,7 @@ def _atoms(states: States, predicate: str, arity: int) -> tuple[Ints, ...]:
     return state, *numbers.reshape(len(found), arity)[which].T
 
 
-def named_objects(worlds: Sequence[World], landmarks: bool = False) -> tuple[str, ...]:
+def named_objects(worlds: Sequence[World], landmarks: bool) -> tuple[str, ...]:
     """The objects that features may name: those that all problems have, robots first.
 
     Where problems have different objects, these are parts of different maps, say; then places that

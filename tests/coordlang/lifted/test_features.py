@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from random import Random
 
@@ -14,7 +15,9 @@ from hypothesis import strategies as st
 from coordlang.lifted import features as f
 from coordlang.lifted.pool import pool_of
 from coordlang.lifted.world import States, World
+from coordlang.sites.coordinates import Point
 from planners.joint.tables import Rows
+from planners.loading import PlanningInstance
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Position
 from tests.support.domains import loaded_from
@@ -34,13 +37,17 @@ MORE = [
 ]
 
 
+def world_of(loaded: PlanningInstance, points: Mapping[str, Point] = {}) -> World:
+    return World(loaded.domain, loaded.problems[0], loaded.model, points)
+
+
 @cache
 def states_of(name: str, each: int = 1) -> States:
     """Every so many-th reachable state of a shipped problem."""
     folder, stem = name.split("/")
     loaded = loaded_from(folder, stem)
     rows = explore(loaded.model, loaded.tasks[0].init[None, :]).rows
-    return States(World.loaded(loaded), rows[::each])
+    return States(world_of(loaded), rows[::each])
 
 
 def atoms_of(world: World, row: Rows) -> dict[str, list[tuple[str, ...]]]:
@@ -159,7 +166,7 @@ def test_by_hand() -> None:
     for text, expected in texts.items():
         assert here.get(feature(text)).tolist() == [expected], text
     loaded = loaded_from("grid", "gw2-2x3")
-    assert World.loaded(loaded, {"c0-1": (7, 7)}).points["c0-1"] == (7, 7)
+    assert world_of(loaded, {"c0-1": (7, 7)}).points["c0-1"] == (7, 7)
 
 
 @pytest.mark.parametrize(
@@ -196,8 +203,8 @@ def test_coordinates_of_a_file() -> None:
     column = feature("(mod (column (at r1)) 4)")  # r1 is at west
     for xs, expected in (((3, 3, 5, 5), 2), ((0.5, 0.5, 0.7, 0.9), 1)):
         points = {name: (x, float(k)) for k, (name, x) in enumerate(zip(names, xs, strict=True))}
-        assert States(World.loaded(loaded, points), rows).get(column).tolist() == [expected]
-    assert States(World.loaded(loaded), rows).get(column).tolist() == [f.UNDEFINED]
+        assert States(world_of(loaded, points), rows).get(column).tolist() == [expected]
+    assert States(world_of(loaded), rows).get(column).tolist() == [f.UNDEFINED]
 
 
 #: Definition # formula # a value # what it means # in English.

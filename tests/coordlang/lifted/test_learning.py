@@ -85,7 +85,7 @@ def test_the_simplest_features_of_the_smallest_grid() -> None:
     assert sum(feature.complexity for feature in learned.features) == least
     assert holds(own, learned.features)
     ((states, tasks, words),) = learned.sizes
-    assert (states, tasks, words) == (12, 132, len(learned.word))
+    assert (states, tasks, words) == (12, 132, len(learned.values))
 
 
 def holds(own: Instance, chosen: Sequence[Feature]) -> bool:
@@ -135,7 +135,7 @@ def test_the_fewest_words_over_classes() -> None:
             for one, own in zip(known, classes, strict=True)
         )
     )
-    assert len(set(learned.word.values())) == least < len(table)
+    assert len(learned.words) == least < len(table)
 
 
 def test_words_may_come_first() -> None:
@@ -143,14 +143,14 @@ def test_words_may_come_first() -> None:
     known = [instance("t-map", "problem")]
     simple = learn(known, complexity=6, prefer="features")
     few = learn(known, complexity=6, prefer="words")
-    sizes = [len(set(learned.word.values())) for learned in (simple, few)]
+    sizes = [len(learned.words) for learned in (simple, few)]
     assert sizes[1] <= sizes[0]
     assert holds_by_words(known[0], words_in(known[0], few))
 
 
 def words_in(own: Instance, learned: Learned) -> Ints:
     values = map(tuple, vectors(learned.features, own.states).tolist())
-    return np.array([learned.word[vector] for vector in values])
+    return np.array([learned.words.index(learned.values[vector]) for vector in values])
 
 
 @pytest.mark.thorough
