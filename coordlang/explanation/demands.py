@@ -15,6 +15,7 @@ import numpy as np
 from coordlang.explanation.words import Cover
 from coordlang.language.words import Partition
 from coordlang.required.choices import Choices
+from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, own_text
 from planners.joint.tables import Bools, Ints, find_rows
 from planners.pddl.robots import natural
@@ -269,17 +270,18 @@ def _deciding(
         kept = find_rows(partition.rows, steps.result) >= 0
         kept |= find_rows(space.rows, steps.result) >= 0
         changes = partition.word_of(steps.result[kept]) == after
-        parts.append((changes, np.column_stack((steps.source, steps.labels))[kept]))
+        parts.append((changes, steps.source[kept], steps.labels[kept]))
     groups = (some for size in range(len(order)) for some in combinations(order, size))
-    deciding = (some for some in groups if all(_settle(*part, some) for part in parts))
+    deciding = (
+        some
+        for some in groups
+        if all(_settle(changes, source, labels[:, some]) for changes, source, labels in parts)
+    )
     return tuple(sorted(next(deciding, order)))
 
 
-def _settle(changes: Bools, steps: Ints, robots: Sequence[int]) -> bool:
-    """Whether of all joint steps from one state in which robots do the same each one changes.
-
-    ``steps``: the state, and then each robot's label.
-    """
-    seen = steps[:, [0, *(1 + robot for robot in robots)]]
+def _settle(changes: Bools, source: Ints, labels: Labels) -> bool:
+    """Whether of all joint steps from one state in which robots do the same each one changes."""
+    seen = np.column_stack((source, labels))
     _, first, inverse = np.unique(seen, axis=0, return_index=True, return_inverse=True)
     return bool((changes == changes[first][inverse.reshape(-1)]).all())

@@ -22,7 +22,7 @@ from coordlang.explanation.demands import words_passed
 from coordlang.simulation.floor import Floor
 from coordlang.simulation.robot import SPEED, TICK, OwnWords
 from coordlang.simulation.simulator import BESIDE
-from coordlang.sites.clearance import distance
+from coordlang.sites.coordinates import distance
 from coordlang.sites.world import World, find_world
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans

@@ -14,10 +14,12 @@ from pathlib import Path
 import networkx as nx
 
 from coordlang.sites.building import Building, Lane, Place, pddl_name
-from coordlang.sites.clearance import clash, excluded, motion
-from coordlang.sites.coordinates import checked
+from coordlang.sites.coordinates import Segment, checked, distance
 from planners.system.errors import BadInput, Position, UsageError, note
 from planners.system.messages import counted, echoed, named, some, visible
+
+#: Metres that rounding may be wrong by.
+_ROUNDING = 1e-9
 
 _DOMAIN = """\
 ; Robots that drive along the lanes of a building, all at the same time (MA-PDDL).
@@ -175,7 +177,7 @@ def _graph(number: int) -> str:
 
 def _excluding(building: Building, clearance: float) -> list[str]:
     """Lines of the problem: where nobody stands, and what nobody drives, while someone drives."""
-    pairs = excluded(building, clearance)
+    pairs = _excluded(building, clearance)
     return [
         *(f"    (keeps-clear {b.start} {a.start} {a.end})" for a, b in pairs if b.start == b.end),
         *(
@@ -346,4 +348,56 @@ def _require_apart(
 
 
 def _too_near(one: Place, other: Place, clearance: float) -> bool:
-    return one is other or clash(motion(one, one), motion(other, other), clearance)
+    return one is other or _clash(_motion(one, one), _motion(other, other), clearance)
+
+
+# ---- what robots may not do in one step: come too near, or share a mutex group
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """What one robot does in a step: it drives from a place to another one, or stays in one.
+
+    ``on`` says by levels where it is meanwhile.
+    """
+
+    start: str
+    end: str
+    on: Mapping[str, Segment]
+    groups: frozenset[str]
+
+
+def _motion(start: Place, end: Place, groups: frozenset[str] = frozenset()) -> _Motion:
+    """Driving along a lane, riding in a lift, or, from a place to itself, staying there."""
+    on = {place.level: (place.point, place.point) for place in (start, end)}
+    if start.level == end.level:
+        on = {start.level: (start.point, end.point)}
+    return _Motion(start.name, end.name, on, groups | start.groups | end.groups)
+
+
+def _clash(one: _Motion, other: _Motion, clearance: float) -> bool:
+    """Whether two robots may not do this in one step, for what they share or how near they come."""
+    if one.groups & other.groups:
+        return True
+    levels = one.on.keys() & other.on.keys()
+    return any(distance(one.on[k], other.on[k]) < clearance - _ROUNDING for k in levels)
+
+
+def _excluded(building: Building, clearance: float) -> list[tuple[_Motion, _Motion]]:
+    """Driving along a lane, and what nobody may do meanwhile: drive along another one, or stay.
+
+    What the rules for every pair of robots forbid is left out: sharing a place, and swapping.
+    """
+    places = building.places
+    groups = defaultdict[tuple[str, str], frozenset[str]](frozenset)
+    for lane in building.lanes:
+        groups[lane.start, lane.end] |= lane.groups
+    driving = [_motion(places[a], places[b], own) for (a, b), own in groups.items()]
+    motions = [*driving, *(_motion(place, place) for place in places.values())]
+    pairs = ((one, other) for k, one in enumerate(driving) for other in motions[k + 1 :])
+    return [pair for pair in pairs if not _is_ruled_out(*pair) and _clash(*pair, clearance)]
+
+
+def _is_ruled_out(one: _Motion, other: _Motion) -> bool:
+    is_swap = (one.start, one.end) == (other.end, other.start)
+    return is_swap or one.start == other.start or one.end == other.end

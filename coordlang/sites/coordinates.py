@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Coordinates of places: from a file, or read from their names."""
+"""Coordinates of places, from a file or read from their names, and how near ways come."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from planners.system.files import FileFormat, doc, read_bytes
 from planners.system.messages import echoed
 
 Point = tuple[float, float]
+#: Where a robot is in the course of a step, on one level: from one point to another.
+Segment = tuple[Point, Point]
 
 #: Coordinates are smaller than this; those of maps in metres reach 10 million.
 _LARGEST = 1e8
@@ -93,3 +95,32 @@ def _numbers(names: Sequence[str]) -> list[Point]:
     if _COLUMN.search(matches[0]["stem"].lower()):
         return pairs
     return [(column, row) for row, column in pairs]
+
+
+def distance(one: Segment, other: Segment) -> float:
+    """How near two robots come in a step, from and to these points.
+
+    Lanes are as far apart as their nearest points, whatever the speeds of robots. Where one robot
+    follows another into the place that this one leaves, both drive evenly through the step.
+    """
+    (a, b), (c, d) = one, other
+    if a == d or b == c:
+        return _from((0.0, 0.0), ((a[0] - c[0], a[1] - c[1]), (b[0] - d[0], b[1] - d[1])))
+    if _sides(one, c, d) < 0 and _sides(other, a, b) < 0:
+        return 0.0  # they cross
+    return min(_from(a, other), _from(b, other), _from(c, one), _from(d, one))
+
+
+def _from(point: Point, segment: Segment) -> float:
+    (x, y), ((ax, ay), (bx, by)) = point, segment
+    squared = (bx - ax) ** 2 + (by - ay) ** 2
+    along = 0.0 if squared == 0 else ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / squared
+    along = min(1.0, max(0.0, along))
+    return math.hypot(ax + along * (bx - ax) - x, ay + along * (by - ay) - y)
+
+
+def _sides(line: Segment, one: Point, other: Point) -> float:
+    """Below 0 where two points are on different sides of a line."""
+    (ax, ay), (bx, by) = line
+    first, second = ((bx - ax) * (y - ay) - (by - ay) * (x - ax) for x, y in (one, other))
+    return first * second

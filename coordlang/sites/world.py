@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import permutations
 
 from planners.grounding.actions import GroundAction
@@ -166,7 +166,6 @@ def _links(
     return tuple(Link((first, second), moves) for first, second, moves in pairs)
 
 
-@dataclass(eq=False, slots=True)
 class _Reading:
     """A predicate read as "a thing is in a place", and what atoms and actions say then.
 
@@ -176,35 +175,28 @@ class _Reading:
     ``signs`` say whether actions make it true, and false.
     """
 
-    predicate: str
-    place: int
-    thing: int | None
-    atoms: list[tuple[Atom, str, str]] = field(default_factory=list)
-    things: set[str] = field(default_factory=set)
-    places: set[str] = field(default_factory=set)
-    moves: set[tuple[str, str]] = field(default_factory=set)
-    owners: set[tuple[int, ...]] = field(default_factory=set)
-    signs: set[bool] = field(default_factory=set)
+    def __init__(
+        self, model: JointModel, kind: tuple[str, int], thing: int | None, place: int
+    ) -> None:
+        self.predicate, self.thing, self.place = kind[0], thing, place
+        atoms = [atom for atom in model.codec.facts.atoms if _kind(atom) == kind]
+        self.atoms = [(atom, *self._read(atom)) for atom in atoms]
+        self.things = {named for _, named, _ in self.atoms}
+        self.places = {where for _, _, where in self.atoms}
+        self.moves, self.owners = set[tuple[str, str]](), set[tuple[int, ...]]()
+        self.signs = set[bool]()
+        for action in model.actions:
+            own = [effect for effect in action.effects if _kind(effect.atom) == kind]
+            self.signs |= {effect.adds for effect in own}
+            for left, entered in permutations(own, 2):
+                (moved, source), (other, target) = self._read(left.atom), self._read(entered.atom)
+                if entered.adds and not left.adds and moved == other and source != target:
+                    self.moves.add((source, target))
+                    self.owners.add(action.owners)
 
-    def read(self, atom: Atom) -> tuple[str, str]:
-        """Return the thing and the place of an atom of the predicate."""
+    def _read(self, atom: Atom) -> tuple[str, str]:
+        """The thing and the place of an atom of the predicate."""
         return "" if self.thing is None else atom.args[self.thing], atom.args[self.place]
-
-    def take_in(self, atom: Atom) -> None:
-        thing, place = self.read(atom)
-        self.atoms.append((atom, thing, place))
-        self.things.add(thing)
-        self.places.add(place)
-
-    def take_in_action(self, action: GroundAction) -> None:
-        kind = self.predicate, 1 if self.thing is None else 2
-        own = [e for e in action.effects if (e.atom.predicate, len(e.atom.args)) == kind]
-        self.signs |= {effect.adds for effect in own}
-        for left, entered in permutations(own, 2):
-            (thing, source), (other, target) = self.read(left.atom), self.read(entered.atom)
-            if entered.adds and not left.adds and thing == other and source != target:
-                self.moves.add((source, target))
-                self.owners.add(action.owners)
 
     def is_among(self, places: Set[str]) -> bool:
         """Whether actions put things into known places, and take them from there."""
@@ -212,18 +204,15 @@ class _Reading:
         return is_known and self.thing is not None and self.signs == {True, False}
 
 
+def _kind(atom: Atom) -> tuple[str, int]:
+    return atom.predicate, len(atom.args)
+
+
 def _readings(model: JointModel) -> list[_Reading]:
-    """Every reading of every predicate with one or two arguments."""
-    ways: dict[int, Sequence[tuple[int, int | None]]] = {1: [(0, None)], 2: [(1, 0), (0, 1)]}
-    found: dict[tuple[str, int, int | None], _Reading] = {}
-    for atom in model.codec.facts.atoms:
-        for way in ways.get(len(atom.args), ()):
-            key = atom.predicate, *way
-            found.setdefault(key, _Reading(*key)).take_in(atom)
-    for reading in found.values():
-        for action in model.actions:
-            reading.take_in_action(action)
-    return sorted(found.values(), key=lambda p: (p.thing is None, p.predicate, -p.place))
+    """Every reading of every predicate with two arguments, and then of those with one."""
+    kinds = sorted({_kind(atom) for atom in model.codec.facts.atoms})
+    two = [_Reading(model, own, *ends) for own in kinds if own[1] == 2 for ends in ((0, 1), (1, 0))]
+    return [*two, *(_Reading(model, own, None, 0) for own in kinds if own[1] == 1)]
 
 
 def _locations(model: JointModel) -> tuple[list[_Reading], set[str]]:

@@ -28,10 +28,10 @@ _EMPTY = {"", "~", "null", "Null", "NULL"}
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A value of a YAML file, and where it stands."""
+    """A value of a YAML file, or an event in reading it, and where it stands."""
 
     path: str
-    node: yaml.Node
+    node: yaml.Node | yaml.Event
 
     @property
     def position(self) -> Position:
@@ -150,9 +150,8 @@ def _require_plain(text: str, file: str) -> None:
         if isinstance(event, yaml.NodeEvent):
             number += 1
             if what := _refused(event, depth + 1, number):
-                where = Position(file, event.start_mark.line + 1, event.start_mark.column + 1)
                 remedy = "A building is plain data: write out what it stands for."
-                raise BadInput(what, position=where, remedy=remedy)
+                raise Value(file, event).wrong(what, remedy)
         depth += isinstance(event, yaml.CollectionStartEvent)
 
 
