@@ -271,13 +271,10 @@ def _deciding(
         kept |= find_rows(space.rows, steps.result) >= 0
         changes = partition.word_of(steps.result[kept]) == after
         parts.append((changes, steps.source[kept], steps.labels[kept]))
-    groups = (some for size in range(len(order)) for some in combinations(order, size))
-    deciding = (
-        some
-        for some in groups
-        if all(_settle(changes, source, labels[:, some]) for changes, source, labels in parts)
-    )
-    return tuple(sorted(next(deciding, order)))
+    for robots in chain(*(combinations(order, size) for size in range(len(order)))):
+        if all(_settle(changes, source, labels[:, robots]) for changes, source, labels in parts):
+            return tuple(sorted(robots))
+    return tuple(sorted(order))
 
 
 def _settle(changes: Bools, source: Ints, labels: Labels) -> bool:

@@ -25,7 +25,7 @@ from coordlang.language.warping import Clause, pair
 from coordlang.language.words import Partition
 from coordlang.lifted.features import Feature
 from coordlang.lifted.language import Vector, vectors
-from coordlang.lifted.pool import Pool, pool_of
+from coordlang.lifted.pool import pool_of
 from coordlang.lifted.world import States, World
 from coordlang.required.miscoordination import Inseparable
 from coordlang.sites.coordinates import Point
@@ -245,10 +245,7 @@ def learn(
     Raises `ProvedImpossible` if no features up to this ``complexity`` suffice; the error has the
     states that must be told apart.
     """
-    learner = _Learner([*known, *held_back], complexity, seed, workers or Workers(), progress)
-    for own in known:
-        learner.take(own)
-    learner.begin()
+    learner = _Learner(known, held_back, complexity, seed, workers or Workers(), progress)
     found = [learner.verified(None)]
     if prefer is None:
         return found[0]
@@ -278,11 +275,12 @@ class _Taken:
 
 
 class _Learner:
-    """What was learned from; ``every`` are all problems."""
+    """What was learned from: the ``known`` problems, and others that refute words."""
 
     def __init__(
         self,
-        every: Sequence[Instance],
+        known: Sequence[Instance],
+        held_back: Sequence[Instance],
         complexity: int,
         seed: int,
         workers: Workers,
@@ -290,10 +288,11 @@ class _Learner:
     ) -> None:
         self.taken: list[_Taken] = []
         self.rounds = 0
-        self.landmarks = False
-        self._every, self._workers = every, workers
+        self._every, self._workers = [*known, *held_back], workers
         self._complexity, self._seed, self._progress = complexity, seed, progress
-        self._pool = Pool((), np.zeros((0, 0), np.int64), 0)
+        for own in known:
+            self.take(own)
+        self.begin()
 
     def take(self, own: Instance, refuted: Ints | None = None) -> None:
         """Learn from this problem, too; words of its states that it refutes give the first clauses.
@@ -369,7 +368,7 @@ class _Learner:
             words, proved = merge_classes(len(table), known, self._progress)
         renumbered = {word: k for k, word in enumerate(dict.fromkeys(words))}
         of_class = np.array([renumbered[word] for word in words], np.int64)
-        names = (f"w{k}" for k in of_class.tolist())
+        names = map("w{}".format, of_class.tolist())
         named = dict(zip(map(tuple, table.tolist()), names, strict=True))
         of_states = [of_class[own] for own in classes]
         sizes = tuple(

@@ -7,6 +7,7 @@ whatever the state: where a place lies, and how it is linked.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -63,15 +64,14 @@ class World(Asked):
     ) -> None:
         self.model, self.robots = model, model.robots
         self.objects = tuple(sorted(problem.objects))
-        statics: dict[str, list[tuple[str, ...]]] = {}
+        statics = defaultdict[str, list[tuple[str, ...]]](list)
         for atom in static_atoms(domain, problem):
-            statics.setdefault(atom.predicate, []).append(atom.args)
+            statics[atom.predicate].append(atom.args)
         self.statics = {name: sorted(own) for name, own in sorted(statics.items())}
-        types: dict[str, set[str]] = {}
+        self.types = defaultdict[str, set[str]](set)
         for name, own in problem.objects.items():
             for kind in {t for each in own for t in supertypes(domain.types, each)}:
-                types.setdefault(kind, set()).add(name)
-        self.types = dict(sorted(types.items()))
+                self.types[kind].add(name)
         given = {name: point for name, point in points.items() if name in problem.objects}
         self.points = _points(self.relations, given)
         self.known: dict[object, Any] = {}
@@ -90,11 +90,11 @@ class World(Asked):
     @cached_property
     def relations(self) -> Mapping[str, Sequence[Pair]]:
         """The static relations between objects: their pairs, sorted."""
-        pairs = {
+        two = {
             name: [(args[0], args[1]) for args in tuples if len(args) == 2]
             for name, tuples in self.statics.items()
         }
-        return {name: own for name, own in pairs.items() if own}
+        return {name: own for name, own in two.items() if own}
 
 
 @dataclass(frozen=True)

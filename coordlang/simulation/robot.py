@@ -135,12 +135,6 @@ def period(longest: float) -> float:
     return round(math.ceil((_TURNING + (longest / SPEED + _SLACK)) / TICK) * TICK, 6)
 
 
-def _bearing(pose: Pose, target: tuple[float, float]) -> float:
-    """Radians to turn, from -pi to pi, until a point is straight ahead."""
-    angle = math.atan2(target[1] - pose[1], target[0] - pose[0]) - pose[2]
-    return math.remainder(angle, 2 * math.pi)
-
-
 @dataclass(frozen=True, slots=True)
 class Sensed:
     """What a robot is told in a tick.
@@ -355,7 +349,8 @@ class Robot:
 
         Where all begin together, all drive off together.
         """
-        angle = _bearing(sensed.pose, target)
+        x, y, heading = sensed.pose
+        angle = math.remainder(math.atan2(target[1] - y, target[0] - x) - heading, 2 * math.pi)
         turn = max(-TURN, min(TURN, _GAIN * angle))
         if self._is_turning:
             waits = self._pace.is_common and sensed.time - step.begin < _TURNING
@@ -368,5 +363,5 @@ class Robot:
         if room <= 0 and self._stopped_in != self.done:
             self._stopped_in = self.done
             self._events.append(("stopped", {}))
-        ahead = _GAIN * math.dist(sensed.pose[:2], target) * max(0.0, math.cos(angle))
+        ahead = _GAIN * math.dist((x, y), target) * max(0.0, math.cos(angle))
         return max(0.0, min(ahead, SPEED, room)), turn

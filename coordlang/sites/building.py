@@ -354,7 +354,7 @@ def _rides(places: Mapping[str, Place], lanes: Sequence[Lane]) -> Iterator[Lane]
     for lane in lanes:
         graphs[lane.start].add(lane.graph)
         graphs[lane.end].add(lane.graph)
-    lifts = [(place, lift) for place in places.values() for lift in _lifts(place)]
+    lifts = [(p, g) for p in places.values() for g in sorted(p.groups) if g.startswith(_LIFT)]
     for place, lift in lifts:
         inside[lift].append(place)
     for one, lift in lifts:
@@ -362,7 +362,3 @@ def _rides(places: Mapping[str, Place], lanes: Sequence[Lane]) -> Iterator[Lane]
             if one.level != other.level:
                 for graph in sorted(graphs[one.name] & graphs[other.name]):
                     yield Lane(graph, one.name, other.name, frozenset({lift}))
-
-
-def _lifts(place: Place) -> list[str]:
-    return sorted(group for group in place.groups if group.startswith(_LIFT))

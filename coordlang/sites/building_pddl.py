@@ -122,7 +122,8 @@ def building_files(
     team = _started(building, robots, clearance)
     goals = _goals(building, team, tasks, clearance)
     used = _used(building, team)
-    graphs = _graphs(team)
+    numbers = sorted({robot.graph for robot in team.values()})
+    graphs = [_graph(number) for number in numbers] if len(numbers) > 1 else []
     excluding = _excluding(used, clearance)
     added = (_GRAPHS if graphs else {}) | (_EXCLUDING if excluding else {})
     problem = [
@@ -163,12 +164,6 @@ def _used(building: Building, team: Mapping[str, Robot]) -> Building:
     places = {name: place for name, place in building.places.items() if name in reached}
     lanes = [n for n in building.lanes if {n.start, n.end} <= reached and n.graph in graphs]
     return replace(building, places=places, lanes=tuple(lanes))
-
-
-def _graphs(team: Mapping[str, Robot]) -> list[str]:
-    """The graphs of the robots; none where all drive on the same one."""
-    numbers = {robot.graph for robot in team.values()}
-    return [_graph(number) for number in sorted(numbers)] if len(numbers) > 1 else []
 
 
 def _graph(number: int) -> str:

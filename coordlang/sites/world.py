@@ -13,7 +13,7 @@ from itertools import permutations
 
 from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel, show
-from planners.pddl.lifted import TRUE, Atom
+from planners.pddl.lifted import TRUE, Atom, Effect
 from planners.pddl.robots import natural
 
 #: What an atom says: ("at", thing, place), ("with", thing, thing), ("mark", place, text), or
@@ -188,11 +188,14 @@ class _Reading:
         for action in model.actions:
             own = [effect for effect in action.effects if _kind(effect.atom) == kind]
             self.signs |= {effect.adds for effect in own}
-            for left, entered in permutations(own, 2):
-                (moved, source), (other, target) = self._read(left.atom), self._read(entered.atom)
-                if entered.adds and not left.adds and moved == other and source != target:
-                    self.moves.add((source, target))
-                    self.owners.add(action.owners)
+            self._take_in_moves(own, action.owners)
+
+    def _take_in_moves(self, effects: Sequence[Effect], owners: tuple[int, ...]) -> None:
+        for left, entered in permutations(effects, 2):
+            (thing, source), (other, target) = self._read(left.atom), self._read(entered.atom)
+            if entered.adds and not left.adds and thing == other and source != target:
+                self.moves.add((source, target))
+                self.owners.add(owners)
 
     def _read(self, atom: Atom) -> tuple[str, str]:
         """The thing and the place of an atom of the predicate."""
