@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations, product
@@ -142,11 +141,10 @@ def _features(vocabulary: _Vocabulary, numbers: Sequence[Number], most: int) -> 
     yield from (Same(one, other) for one, other in combinations(vocabulary.terms(), 2))
 
 
-def _pairs(simplest_first: Sequence[Any], most: int) -> Iterator[tuple[Any, Any]]:
-    """Pairs that together have no more than this complexity, as `combinations` gives them."""
-    known = [one.complexity for one in simplest_first]
-    for k, one in enumerate(simplest_first):
-        yield from product([one], simplest_first[k + 1 : bisect_right(known, most - known[k])])
+def _pairs(found: Sequence[Any], most: int) -> Iterator[tuple[Any, Any]]:
+    """Pairs that together have no more than this complexity."""
+    known = [(one.complexity, one) for one in found]
+    return ((a, b) for (one, a), (other, b) in combinations(known, 2) if one + other <= most)
 
 
 def _comparable(one: Number, other: Number) -> bool:
@@ -179,13 +177,10 @@ def _different_numbers(found: Iterable[Number], states: Sequence[States]) -> lis
     """The simplest of equal numbers; none that is the same in all states."""
     kept: dict[bytes, Number] = {}
     for number in sorted(found, key=_simplest):
-        parts = [number(own) for own in states]
-        values = np.concatenate(parts)
+        values = np.concatenate([number(own) for own in states])
         key = values.astype(np.int32).tobytes()
         if key not in kept and len(values) and (values != values[0]).any():
             kept[key] = number
-            for own, part in zip(states, parts, strict=True):
-                own.known[number,] = part
     return [*kept.values()]
 
 
@@ -197,13 +192,10 @@ def _concepts(vocabulary: _Vocabulary, states: Sequence[States], most: int) -> l
     for complexity in range(1, most - 2):
         levels.append([])
         for concept in sorted(_next_concepts(vocabulary, levels, complexity), key=str):
-            members = [concept(own) for own in states]
-            key = b"".join(np.packbits(own).tobytes() for own in members)
+            key = b"".join(np.packbits(concept(own)).tobytes() for own in states)
             if key not in seen:
                 seen.add(key)
                 levels[-1].append(concept)
-                for own, table in zip(states, members, strict=True):
-                    own.known[concept,] = table
             if len(seen) > _CONCEPTS or len(seen) * entries > _ENTRIES:
                 return [*chain(*levels)]
     return [*chain(*levels)]

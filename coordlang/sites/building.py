@@ -272,8 +272,10 @@ def _set_image_scales(levels: Sequence[_Level], named: Value | None) -> tuple[st
     The reference level has measurements.  Another one is as large as the fiducials say that both
     have; its own measurements count where there are fewer than two.
     """
-    reference = _reference(levels, named)
-    known, marks = reference.measured(), reference.fiducials()
+    found = [level for level in levels if named is None or level.name == named.text()]
+    if named is not None and not found:
+        raise named.wrong(f"there is no level {echoed(named.text())}", "Name one of the levels.")
+    known, marks = found[0].measured(), found[0].fiducials()
     unscaled = []
     for level in levels:
         size, scale = _size(level.fiducials(), marks), level.measured()
@@ -285,15 +287,6 @@ def _set_image_scales(levels: Sequence[_Level], named: Value | None) -> tuple[st
             scale = 1.0
         level.set_scale(scale, scale)
     return tuple(unscaled)
-
-
-def _reference(levels: Sequence[_Level], named: Value | None) -> _Level:
-    if named is None:
-        return levels[0]
-    for level in levels:
-        if level.name == named.text():
-            return level
-    raise named.wrong(f"there is no level {echoed(named.text())}", "Name one of the levels.")
 
 
 def _size(own: Mapping[str, Point], marks: Mapping[str, Point]) -> float | None:
