@@ -8,10 +8,9 @@ from typing import Any
 
 from benchmarks.paper.task_choices import sentence_of
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.simulation.floor import Floor
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.run import runs_of
-from coordlang.simulation.simulator import Settings
+from coordlang.simulation.simulator import Floor, Settings
 from coordlang.simulation.team import Agreement, Mission
 from coordlang.sites.coordinates import Point
 from planners.search.plans import Plan

@@ -17,7 +17,6 @@ from coordlang.commands.terminal import covered_code, echo, ended_early, working
 from coordlang.execution.best_sentence import best_sentence, read_preference
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.provenance import Tolerance
-from coordlang.simulation.floor import MOST_RADIUS, Floor
 from coordlang.simulation.record import (
     RunRecord,
     SimulationRecord,
@@ -27,7 +26,7 @@ from coordlang.simulation.record import (
 )
 from coordlang.simulation.recording import RECORDINGS
 from coordlang.simulation.run import record_of, runs_of
-from coordlang.simulation.simulator import Settings, require_simulator
+from coordlang.simulation.simulator import MOST_RADIUS, Floor, Settings, require_simulator
 from coordlang.simulation.team import Agreement, Mission
 from planners.system.errors import UsageError, note
 from planners.system.limits import reaching, run_until_stopped

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from coordlang.simulation.floor import Wall
+from coordlang.simulation.simulator import Wall
 from planners.system.errors import BadInput, Position
 from planners.system.files import FileFormat, doc, read_bytes
 

@@ -11,7 +11,6 @@ from random import Random
 from typing import Any
 
 from coordlang.language.candidates import describe
-from coordlang.simulation.floor import Floor, require_room
 from coordlang.simulation.record import (
     FORMAT,
     VERSION,
@@ -22,7 +21,7 @@ from coordlang.simulation.record import (
     WishRecord,
 )
 from coordlang.simulation.robot import TICK, Notice, Pace, Pose, Robot, Sensed, period
-from coordlang.simulation.simulator import POSITION_NOISE, WALL, Settings, Simulator
+from coordlang.simulation.simulator import POSITION_NOISE, WALL, Floor, Settings, Simulator
 from coordlang.simulation.team import Mission
 
 #: A run ends when no step has begun or ended for so many periods: nobody will move any more.
@@ -45,7 +44,7 @@ def runs_of(
     way.  The same seed gives the same run; O(robots * ticks).  Raises `UsageError` if ir-sim is not
     installed, or the robots are too large for the floor.
     """
-    require_room(floor, settings.radius)
+    floor.require_room(settings.radius)
     for further in range(number):
         going = _Going(mission, floor, settings, seed + further, wishes)
         while not going.has_ended:

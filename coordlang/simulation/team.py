@@ -19,9 +19,8 @@ from coordlang.execution.choices import choices, knowing_own, monitor
 from coordlang.execution.monitor import IDLE, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
-from coordlang.simulation.floor import Floor
 from coordlang.simulation.robot import SPEED, TICK, OwnWords
-from coordlang.simulation.simulator import BESIDE
+from coordlang.simulation.simulator import BESIDE, Floor
 from coordlang.sites.coordinates import distance
 from coordlang.sites.world import World, find_world
 from planners.search.plan_space import PlanSpace

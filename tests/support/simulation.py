@@ -8,10 +8,9 @@ from functools import cache
 from coordlang.commands.building import build_language
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage, language_in_task
-from coordlang.simulation.floor import Floor
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.run import runs_of
-from coordlang.simulation.simulator import Settings
+from coordlang.simulation.simulator import Floor, Settings
 from coordlang.simulation.team import Agreement, Mission
 from planners.pddl.model_options import ModelOptions
 from tests.support.domains import own_task, read

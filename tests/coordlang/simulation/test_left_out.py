@@ -11,8 +11,8 @@ from unittest.mock import Mock
 import pytest
 
 import coordlang
-from coordlang.simulation.floor import Floor, outlines, require_room
 from coordlang.simulation.recording import RECORDINGS
+from coordlang.simulation.simulator import Floor, outlines
 from coordlang.sites.world import Link, World
 from planners.system.errors import BadInput, Note, UsageError
 from planners.system.signals import Interrupted
@@ -154,6 +154,6 @@ def test_outlines_draw_every_wall_and_nothing_else(folder: str) -> None:
 
 def test_robots_that_are_too_large_are_an_error() -> None:
     floor = floor_for(mission_of("t-map"))
-    require_room(floor, 0.25)
+    floor.require_room(0.25)
     with pytest.raises(UsageError, match=r"radius may be 0\.25 at most"):
-        require_room(floor, 0.26)
+        floor.require_room(0.26)
