@@ -438,10 +438,14 @@ def _read(kind: str, tree: Tree) -> Any:
             return tree
         case "int", str() if 0 < int(tree) < LARGEST:
             return int(tree)
-        case "Term", _:
-            return _term(tree)
-        case "Role", _:
-            return _role(tree)
+        case "Term", ["inverse", str(predicate), str(named)]:
+            return Term(predicate, named, inverse=True)
+        case "Role", str():
+            return Role(tree)
+        case "Role", ["inverse", str(predicate)]:
+            return Role(predicate, inverse=True)
+        case "Role", ["closure", one]:
+            return replace(_read("Role", one), closure=True)  # twice is refused: it is written once
         case "Concept", str():
             return Everything() if tree == "all" else Named(tree)
         case _, [str(head), *parts]:
@@ -451,6 +455,8 @@ def _read(kind: str, tree: Tree) -> Any:
 
 def _of_parts(kind: str, head: str, parts: list[Tree]) -> Expression:
     match kind, head, parts:
+        case "Term", _, [str(named)]:
+            return Term(head, named)
         case "Feature", "mod", [_, "1"]:
             raise ValueError
         case "Feature", "sign", [["-", one, other]]:
@@ -458,32 +464,12 @@ def _of_parts(kind: str, head: str, parts: list[Tree]) -> Expression:
         case "Number", "count", [predicate, *args]:
             return Count(_read("str", predicate), tuple(_read("str", arg) for arg in args))
         case "Number", ("row" | "column"), [term]:
-            return Attribute(head, "", _term(term))
+            return Attribute(head, "", _read("Term", term))
         case "Number", ("degree" | "position"), [str(relation), term]:
-            return Attribute(head, relation, _term(term))
+            return Attribute(head, relation, _read("Term", term))
     made = _MADE[kind, head]
     kinds = [str(field.type) for field in fields(made)]  # type: ignore[arg-type]
     return made(*(_read(own, part) for own, part in zip(kinds, parts, strict=True)))
-
-
-def _term(tree: Tree) -> Term:
-    match tree:
-        case ["inverse", str(predicate), str(named)]:
-            return Term(predicate, named, inverse=True)
-        case [str(predicate), str(named)]:
-            return Term(predicate, named)
-    raise ValueError
-
-
-def _role(tree: Tree) -> Role:
-    match tree:
-        case str(predicate):
-            return Role(predicate)
-        case ["inverse", str(predicate)]:
-            return Role(predicate, inverse=True)
-        case ["closure", one]:
-            return replace(_role(one), closure=True)  # twice is refused: it is written once
-    raise ValueError
 
 
 # ---- as formulas and in English

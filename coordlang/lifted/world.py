@@ -56,11 +56,7 @@ class World(Asked):
     """
 
     def __init__(
-        self,
-        domain: Domain,
-        problem: Problem,
-        model: JointModel,
-        points: Mapping[str, Point],
+        self, domain: Domain, problem: Problem, model: JointModel, points: Mapping[str, Point]
     ) -> None:
         self.model, self.robots = model, model.robots
         self.objects = tuple(sorted(problem.objects))
@@ -72,8 +68,10 @@ class World(Asked):
         for name, own in problem.objects.items():
             for kind in {t for each in own for t in supertypes(domain.types, each)}:
                 self.types[kind].add(name)
-        given = {name: point for name, point in points.items() if name in problem.objects}
-        self.points = _points(self.relations, given)
+        self.points = {name: point for name, point in points.items() if name in problem.objects}
+        for linked in self.relations.values():
+            by_names = from_names(sorted({*chain(*linked)}), linked) or {}
+            self.points = by_names | self.points
         self.known: dict[object, Any] = {}
 
     @cached_property
@@ -171,18 +169,6 @@ def named_objects(worlds: Sequence[World], landmarks: bool) -> tuple[str, ...]:
         common -= {*chain(*(args for args in tuples if len(args) > 1))}
     robots = worlds[0].robots
     return tuple(name for name in (*robots, *sorted(common - set(robots))) if name != ANY)
-
-
-def _points(
-    relations: Mapping[str, Sequence[Pair]], known: Mapping[str, Point]
-) -> dict[str, Point]:
-    """Coordinates of the objects that static relations link: the known ones, else by names."""
-    points = dict(known)
-    for links in relations.values():
-        names = sorted({*chain(*links)})
-        if not known.keys() >= set(names):
-            points = (from_names(names, links) or {}) | points
-    return points
 
 
 # ---- numbers of objects

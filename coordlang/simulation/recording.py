@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -233,11 +234,8 @@ def _timeline(axes: Axes, record: SimulationRecord, run: RunRecord, times: Seque
 
 def _caption(record: SimulationRecord, run: RunRecord, time: float) -> str:
     """What is written above the floor: the time, and how many steps each robot has done."""
-    done = dict.fromkeys(record.robots, 0)
-    for step in run.steps:
-        if step.end is not None and step.end <= time:
-            done[step.robot] += 1
-    steps = ", ".join(f"{name} {number}" for name, number in done.items())
+    done = Counter(s.robot for s in run.steps if s.end is not None and s.end <= time)
+    steps = ", ".join(f"{name} {done[name]}" for name in record.robots)
     return f"{time:5.1f} s   steps done: {steps} of {record.makespan}"
 
 

@@ -71,8 +71,7 @@ class Mission:
             for number in sorted(set(space.state.tolist()))
         }
         _note_what_is_left_out(self.world, model.robots, self._at.values())
-        numbered = enumerate(model.robots)
-        self.leads = {name: _leads(self.world, space, robot) for robot, name in numbered}
+        self.leads = {name: _leads(self.world, space, k) for k, name in enumerate(model.robots)}
         self.steps = space.cost_of(task_language.task)[0]
         task = [task_language.task]
         self._plans = Plans.of(space.with_tasks(space.starts[task], space.second[task]))

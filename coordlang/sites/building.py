@@ -272,10 +272,12 @@ def _set_image_scales(levels: Sequence[_Level], named: Value | None) -> tuple[st
     The reference level has measurements.  Another one is as large as the fiducials say that both
     have; its own measurements count where there are fewer than two.
     """
-    found = [level for level in levels if named is None or level.name == named.text()]
-    if named is not None and not found:
-        raise named.wrong(f"there is no level {echoed(named.text())}", "Name one of the levels.")
-    known, marks = found[0].measured(), found[0].fiducials()
+    reference, by_name = levels[0], {level.name: level for level in levels}
+    if named is not None:
+        if (name := named.text()) not in by_name:
+            raise named.wrong(f"there is no level {echoed(name)}", "Name one of the levels.")
+        reference = by_name[name]
+    known, marks = reference.measured(), reference.fiducials()
     unscaled = []
     for level in levels:
         size, scale = _size(level.fiducials(), marks), level.measured()

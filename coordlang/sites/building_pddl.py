@@ -13,7 +13,7 @@ from pathlib import Path
 
 import networkx as nx
 
-from coordlang.sites.building import Building, Lane, Place, pddl_name
+from coordlang.sites.building import Building, Place, pddl_name
 from coordlang.sites.coordinates import Segment, checked, distance
 from planners.system.errors import BadInput, Position, UsageError, note
 from planners.system.messages import counted, echoed, named, some, visible
@@ -208,10 +208,8 @@ def _facts(building: Building, team: Mapping[str, Robot], *, with_graphs: bool) 
 
 def _lanes(building: Building, *, with_graphs: bool) -> Iterator[str]:
     """The lanes out of each place, each once, and the graphs that have them."""
-    leaving: dict[str, list[Lane]] = {name: [] for name in building.places}
-    for lane in building.lanes:
-        leaving[lane.start].append(lane)
-    for out in leaving.values():
+    for place in building.places:
+        out = [lane for lane in building.lanes if lane.start == place]
         yield from _wrapped([*dict.fromkeys(f"(lane {lane.start} {lane.end})" for lane in out)])
         if with_graphs:
             yield from _wrapped([f"(on-graph {n.start} {n.end} {_graph(n.graph)})" for n in out])
