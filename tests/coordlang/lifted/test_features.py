@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
 from random import Random
 
@@ -15,7 +14,6 @@ from hypothesis import strategies as st
 from coordlang.lifted import features as f
 from coordlang.lifted.pool import pool_of
 from coordlang.lifted.world import States, World
-from coordlang.sites.coordinates import Point
 from planners.joint.tables import Rows
 from planners.loading import PlanningInstance
 from planners.search.reachable import explore
@@ -37,7 +35,7 @@ MORE = [
 ]
 
 
-def world_of(loaded: PlanningInstance, points: Mapping[str, Point] = {}) -> World:
+def world_of(loaded: PlanningInstance, points: dict[str, tuple[float, float]]) -> World:
     return World(loaded.domain, loaded.problems[0], loaded.model, points)
 
 
@@ -47,7 +45,7 @@ def states_of(name: str, each: int = 1) -> States:
     folder, stem = name.split("/")
     loaded = loaded_from(folder, stem)
     rows = explore(loaded.model, loaded.tasks[0].init[None, :]).rows
-    return States(world_of(loaded), rows[::each])
+    return States(world_of(loaded, {}), rows[::each])
 
 
 def atoms_of(world: World, row: Rows) -> dict[str, list[tuple[str, ...]]]:
@@ -197,14 +195,16 @@ def test_equal_features_are_kept_once() -> None:
 
 def test_coordinates_of_a_file() -> None:
     """From the least one; where they are no whole numbers, in their order."""
-    loaded = loaded_from("handover", "exchange")
-    names = ("east", "east-north", "west", "west-north")
+    loaded, names = (
+        loaded_from("handover", "exchange"),
+        ("east", "east-north", "west", "west-north"),
+    )
     rows = loaded.tasks[0].init[None, :]
     column = feature("(mod (column (at r1)) 4)")  # r1 is at west
     for xs, expected in (((3, 3, 5, 5), 2), ((0.5, 0.5, 0.7, 0.9), 1)):
         points = {name: (x, float(k)) for k, (name, x) in enumerate(zip(names, xs, strict=True))}
         assert States(world_of(loaded, points), rows).get(column).tolist() == [expected]
-    assert States(world_of(loaded), rows).get(column).tolist() == [f.UNDEFINED]
+    assert States(world_of(loaded, {}), rows).get(column).tolist() == [f.UNDEFINED]
 
 
 #: Definition # formula # a value # what it means # in English.

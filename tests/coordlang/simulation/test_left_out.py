@@ -115,21 +115,15 @@ def world(places: tuple[str, ...], *links: tuple[str, str]) -> World:
 T = world(("c0-1", "c1-0", "c1-1", "c1-2"), ("c0-1", "c1-1"), ("c1-0", "c1-1"), ("c1-1", "c1-2"))
 
 
-def test_rows_go_down_and_metres_go_up() -> None:
+def test_rows_go_down_and_walls_are_all_sides_that_no_link_crosses() -> None:
+    """Of the four cells of the T-map 16 sides, less two for each of three links."""
     floor = Floor(T, {})
     assert floor.points == {"c0-1": (1, 1), "c1-0": (0, 0), "c1-1": (1, 0), "c1-2": (2, 0)}
     assert (floor.shortest, floor.longest) == (1, 1)
-
-
-def test_walls_are_all_sides_that_no_link_crosses() -> None:
-    """Of the four cells of the T-map 16 sides, less two for each of three links."""
-    floor = Floor(T, {})
     lengths = [abs(x2 - x1) + abs(y2 - y1) for x1, y1, x2, y2 in floor.walls]
     assert sum(lengths) == 16 - 2 * 3
     assert (-0.5, -0.5, 2.5, -0.5) in floor.walls, "the lower sides of three cells are one wall"
-
-
-def test_neighbours_without_a_link_have_a_wall_between_them() -> None:
+    # Neighbours without a link have a wall between them.
     ring = world(("c0-0", "c0-1", "c1-0", "c1-1"), ("c0-0", "c0-1"), ("c1-0", "c1-1"))
     assert (-0.5, 0.5, 1.5, 0.5) in Floor(ring, {}).walls
 
