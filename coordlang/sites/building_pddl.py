@@ -12,9 +12,11 @@ from itertools import chain, combinations, count, islice
 from pathlib import Path
 
 import networkx as nx
+import numpy as np
 
 from coordlang.sites.building import Building, Place, pddl_name
 from coordlang.sites.coordinates import Segment, checked, distance
+from planners.joint.tables import Bools
 from planners.system.errors import BadInput, Position, UsageError, note
 from planners.system.messages import counted, echoed, named, some, visible
 
@@ -386,9 +388,26 @@ def _excluded(building: Building, clearance: float) -> list[tuple[_Motion, _Moti
     for lane in building.lanes:
         groups[lane.start, lane.end] |= lane.groups
     driving = [_motion(places[a], places[b], own) for (a, b), own in groups.items()]
+    if not driving or (clearance <= 0 and not any(motion.groups for motion in driving)):
+        return []
     motions = [*driving, *(_motion(place, place) for place in places.values())]
-    pairs = ((one, other) for k, one in enumerate(driving) for other in motions[k + 1 :])
+    near = np.triu(_near(motions, clearance), 1)[: len(driving)]
+    pairs = [(motions[first], motions[second]) for first, second in np.argwhere(near).tolist()]
     return [pair for pair in pairs if not _is_ruled_out(*pair) and _clash(*pair, clearance)]
+
+
+def _near(motions: Sequence[_Motion], clearance: float) -> Bools:
+    """Which motions may clash with which: they have a group in common, or their boxes are near."""
+    near = np.zeros((len(motions), len(motions)), np.bool_)
+    for group in frozenset[str]().union(*(motion.groups for motion in motions)):
+        inside = [group in motion.groups for motion in motions]
+        near |= np.outer(inside, inside)
+    for level in {level for motion in motions for level in motion.on}:
+        there = [number for number, motion in enumerate(motions) if level in motion.on]
+        ends = np.array([motions[number].on[level] for number in there])
+        low, high = ends.min(axis=1), ends.max(axis=1) + clearance
+        near[np.ix_(there, there)] |= ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    return near
 
 
 def _is_ruled_out(one: _Motion, other: _Motion) -> bool:
