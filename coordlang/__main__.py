@@ -12,16 +12,10 @@ import sys
 from typing import NoReturn
 
 import coordlang
-
-if sys.platform != "win32":  # it has no SIGHUP
-    from planners.system.signals import Interruptions
+from planners.system.signals import Interruptions
 
 #: Digits of a number of plans: more than there are plans of any space that fits into memory.
 _DIGITS = 100_000
-
-#: New containers after which Python looks for garbage in cycles (700 if nothing is said): modules,
-#: ground actions and tables make many that stay, and hardly a cycle.
-_CONTAINERS = 50_000
 
 #: The exit code on a system that coordlang does not run on: that of what it relies on.
 _NOT_HERE = 32
@@ -33,10 +27,7 @@ def main() -> NoReturn:
     Ctrl-C (SIGINT), SIGTERM and SIGHUP end the work at any moment, imports included: what is half
     done is removed, and the exit code is 128 and the number of the signal.
     """
-    if sys.platform == "win32":
-        sys.exit(_refused())
     interruptions = Interruptions()
-    gc.set_threshold(_CONTAINERS)
     # numpy's BLAS would start a thread for each core; what is multiplied here is small.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if 0 < sys.get_int_max_str_digits() < _DIGITS:  # 0: there is no limit
@@ -44,7 +35,7 @@ def main() -> NoReturn:
     code = 0
     try:
         try:
-            code = _refused() or _run(interruptions)
+            code = _run(interruptions)
         finally:
             interruptions.end()
     except Exception:
@@ -59,15 +50,10 @@ def main() -> NoReturn:
     sys.exit(code)
 
 
-def _refused() -> int:
-    """The exit code on a system that coordlang does not run on, with a message; 0 elsewhere."""
+def _run(interruptions: Interruptions) -> int:
     if why_not := coordlang.why_not_here():
         print(f"coordlang: {why_not}", file=sys.stderr)
         return _NOT_HERE
-    return 0
-
-
-def _run(interruptions: Interruptions) -> int:
     from coordlang.commands.main import run
     from coordlang.commands.terminal import flush_stdout, whatever_stderr
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from coordlang.commands.inputs import Arguments, InTask, public
+from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import ChoicesOptions, File
 from coordlang.commands.terminal import (
     REFUTED,
@@ -30,7 +30,7 @@ from coordlang.commands.witness import witness_text
 from coordlang.execution import choices as execution
 from coordlang.execution.choices import RobotChoices, SentenceChoices, to_bytes
 from coordlang.execution.monitor import Monitor
-from coordlang.execution.task_language import TaskLanguage
+from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import percent
 from coordlang.required.failure import TooManyToCount, failure_of_sentence

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from coordlang.commands.inputs import Arguments, InTask, coordinates_of, public
+from coordlang.commands.inputs import Arguments, coordinates_of, public
 from coordlang.commands.plans import plans_text
 from coordlang.commands.records import ExplainOptions
 from coordlang.commands.terminal import covered_code, echo, warn_of_failures, working
 from coordlang.execution.best_sentence import leading_sentences
-from coordlang.execution.task_language import TaskLanguage
+from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.explanation import text as texts
 from coordlang.explanation import words as wording
 from coordlang.explanation.demands import SentenceDemands, meaning, sentence_demands

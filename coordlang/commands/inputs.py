@@ -19,14 +19,12 @@ from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import Position, UsageError, note
 from planners.system.files import names_format, read_bytes
-from planners.system.messages import Presented
 from planners.system.options import checked_argument, options_of, record_from
 
 if TYPE_CHECKING:
     from coordlang.execution.task_language import TaskLanguage
     from coordlang.language.candidates import Candidates
     from coordlang.language.listed import ListedTask
-    from coordlang.language.provenance import Tolerance
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
     from coordlang.sites.coordinates import Point
@@ -221,23 +219,6 @@ class ReadTask(NamedTuple):
     files: PlanningInput
     used: TaskLanguage
     position: Position
-
-
-class InTask(Presented):
-    """A result about one task under a language.  ``used`` is the language in the task."""
-
-    __slots__ = ()
-    used: TaskLanguage
-
-    @property
-    def covered(self) -> bool:
-        """Whether the task is one that the language guarantees."""
-        return self.used.covered
-
-    @property
-    def tolerance(self) -> Tolerance | None:
-        """What may go wrong, or be longer, under the language; None: nothing."""
-        return self.used.language.tolerance
 
 
 def wishes_in(prefer: str | Sequence[str]) -> tuple[str, ...]:

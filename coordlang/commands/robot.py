@@ -16,7 +16,7 @@ from select import select  # which takes files, too
 from time import monotonic, time
 from typing import Any, NoReturn
 
-from coordlang.commands.inputs import Arguments, InTask, ReadTask, coordinates_of, public, wishes_in
+from coordlang.commands.inputs import Arguments, ReadTask, coordinates_of, public, wishes_in
 from coordlang.commands.records import RobotOptions
 from coordlang.commands.terminal import echo
 from coordlang.execution.best_sentence import Preference, best_sentence, grants, read_preference
@@ -25,7 +25,7 @@ from coordlang.execution.choices import choices, monitor
 from coordlang.execution.executive import Executive
 from coordlang.execution.fleet_log import Agreement
 from coordlang.execution.monitor import EventMonitor
-from coordlang.execution.task_language import TaskLanguage
+from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.language.file import to_data
 from coordlang.language.provenance import domain_sha256
 from coordlang.sites.coordinates import Point

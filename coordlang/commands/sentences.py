@@ -10,14 +10,14 @@ from functools import partial
 from os import PathLike, fspath
 from typing import Any
 
-from coordlang.commands.inputs import Arguments, InTask, public, wishes_in
+from coordlang.commands.inputs import Arguments, public, wishes_in
 from coordlang.commands.plans import OptimalPlans, PlanSteps, show_listed
 from coordlang.commands.records import PlanOptions, SayOptions, UnderstandOptions
 from coordlang.commands.terminal import covered_code, echo
 from coordlang.execution.best_sentence import Preference, best_sentence, read_preference
 from coordlang.execution.guided_search import GuidedPlan, plan_under_sentence
 from coordlang.execution.plan_sentence import PlanDag, sentence_of_plan
-from coordlang.execution.task_language import TaskLanguage
+from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
 from planners.search.heuristics import HEURISTICS

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from coordlang.language.listed import ListedTask, model_of_listed
+from coordlang.language.provenance import Tolerance
 from coordlang.language.recorded import check_source, options_of, recorded_list
 from coordlang.language.words import Language, Partition
 from coordlang.verification.by_definition import Verdict, verify
@@ -22,7 +23,7 @@ from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
 from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, UsageError, note
-from planners.system.messages import echoed
+from planners.system.messages import Presented, echoed
 
 
 class NoPlanFits(Refuted):
@@ -249,3 +250,20 @@ def _covers(language: Language, space: PlanSpace, recorded: Sequence[PlanningTas
 
 def _literals(goal: Goal) -> frozenset[object]:
     return frozenset((goal,) if isinstance(goal, FullState) else conjuncts(goal))
+
+
+class InTask(Presented):
+    """A result about one task under a language.  ``used`` is the language in the task."""
+
+    __slots__ = ()
+    used: TaskLanguage
+
+    @property
+    def covered(self) -> bool:
+        """Whether the task is one that the language guarantees."""
+        return self.used.covered
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.used.language.tolerance

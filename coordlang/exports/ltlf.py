@@ -11,10 +11,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from coordlang.execution.task_language import TaskLanguage
+from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.explanation.words import Conjunction
 from coordlang.exports.membership import refuse_seen_slack, short_terms
+from coordlang.language.provenance import tolerance_data
 from planners.joint.model import show
 from planners.pddl.lifted import Atom
 
@@ -22,8 +24,8 @@ from planners.pddl.lifted import Atom
 _TAKEN = re.compile(r"[^a-z]|true|false|last|end|tt|ff")
 
 
-@dataclass(frozen=True, slots=True)
-class SentenceFormula:
+@dataclass(frozen=True, slots=True, repr=False)
+class ExportedFormula(InTask):
     """A sentence as an LTLf formula over the states of a plan, the initial state first.
 
     ``formula`` is satisfied by the states of a plan exactly if the plan has the sentence, as long
@@ -32,13 +34,24 @@ class SentenceFormula:
     ``symbols``: symbol -> PDDL atom.
     """
 
+    used: TaskLanguage
     formula: str
     over_words: str
     words: dict[str, str]
     symbols: dict[str, str]
+    shown = ("over_words",)
+
+    def __str__(self) -> str:
+        return self.formula
+
+    def data(self) -> dict[str, Any]:
+        """The formulas, as ``--json`` has them."""
+        names = ("formula", "over_words", "words", "symbols")
+        own = {name: getattr(self, name) for name in names}
+        return {**own, **tolerance_data(self.tolerance)}
 
 
-def export_ltlf(task_language: TaskLanguage, words: Sequence[int]) -> SentenceFormula:
+def export_ltlf(task_language: TaskLanguage, words: Sequence[int]) -> ExportedFormula:
     """The sentence ``words`` as a formula over the states of a plan, the initial state first.
 
     A plan has the sentence w0 w1 .. wk exactly if it is in w0 for a while, then in w1, and so on,
@@ -54,7 +67,8 @@ def export_ltlf(task_language: TaskLanguage, words: Sequence[int]) -> SentenceFo
     names = symbols_of(task_language.partition.words[word] for word in used)
     name_of = dict(zip(used, names, strict=True))
     meaning = {word: disjunction(terms[word], symbol) for word in used}
-    return SentenceFormula(
+    return ExportedFormula(
+        task_language,
         formula=_in_turn([meaning[word] for word in words]),
         over_words=_in_turn([name_of[word] for word in words]),
         words={name_of[word]: meaning[word] for word in used},

@@ -21,9 +21,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from os import PathLike, fspath
+from typing import Any
 
 from coordlang.execution.guided_search import plan_under_sentence
-from coordlang.execution.task_language import TaskLanguage
+from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.explanation.variables import truth
 from coordlang.exports.membership import Terms, exclusive_terms, refuse_seen_slack
 from planners.classical import compile_classical
@@ -37,15 +39,17 @@ from planners.classical.task import (
 )
 from planners.joint.model import IDLE, JointModel, PlanningTask, show
 from planners.pddl.lifted import Atom
-from planners.search.plans import Plan
-from planners.system.errors import BadInput, UsageError
+from planners.search.plan_file import only_one_plan
+from planners.search.plans import Plan, Plans, Texts, texts
+from planners.system.errors import BadInput, Position, Refuted, UsageError
 from planners.system.messages import echoed
+from planners.system.writing import write_texts
 
 #: Beyond this many joint actions robots choose one after another.
 MAX_ACTIONS = 2000
 
 
-class PddlExport:
+class ExportedTask(InTask):
     """A task under a sentence as PDDL; its optimal plans are exactly those of the sentence.
 
     ``classical`` is the task as data, ``domain`` and ``problem`` the same as PDDL text, ``cost``
@@ -63,10 +67,12 @@ class PddlExport:
     count joint steps; with slack, for words that see it, and where more than joint steps counts.
     """
 
+    shown = ("form", "actions", "cost")
+
     def __init__(
-        self, task_language: TaskLanguage, words: Sequence[int], *, strips_only: bool = False
+        self, used: TaskLanguage, words: Sequence[int], *, strips_only: bool = False
     ) -> None:
-        self.model = model = task_language.model
+        self.used, self.model = used, (model := used.model)
         refuse_seen_slack(model, "--to pddl")
         if model.slack and model.cost != "makespan":
             raise UsageError(
@@ -75,16 +81,17 @@ class PddlExport:
                 remedy="Build the language with --cost makespan; `coordlang understand`, `plan` "
                 "and `choices` give its plans.",
             )
-        space = task_language.plans_with(words)
+        space = used.plans_with(words)
+        self.plans = Plans.of(space)
         makespan, second = space.cost_of(0)
         start = space.starts[0]
         task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
         plain = compile_classical(model, task, MAX_ACTIONS, longest=max(1, makespan))
-        tests = exclusive_terms(task_language)
-        naming = _Naming(task_language, words, plain, tests, makespan if model.slack else None)
+        tests = exclusive_terms(used)
+        naming = _Naming(used, words, plain, tests, makespan if model.slack else None)
         named = naming.task()
         if model.slack and not naming.remembered:  # else a rest is seen, and is part of the plan
-            makespan, second = plan_under_sentence(task_language, words).cost
+            makespan, second = plan_under_sentence(used, words).cost
         if strips_only:
             _require_steps_counted(plain, model)
         named = with_positive_literals(named, only_goal=not strips_only)
@@ -98,6 +105,64 @@ class PddlExport:
         }
         self.cost = plain.step_cost * makespan + second
         self.terms = sum(map(len, tests))
+
+    @property
+    def form(self) -> str:
+        """How joint steps are written: ``explicit`` (one action each) or robot after robot."""
+        return self.classical.form
+
+    @property
+    def actions(self) -> int:
+        """The number of actions."""
+        return len(self.classical.actions)
+
+    def save(self, folder: str | PathLike[str]) -> None:
+        """Write ``domain.pddl`` and ``problem.pddl`` into a folder, which is made if it is missing.
+
+        Raises `UsageError` if it cannot be written to.
+        """
+        texts = {"domain.pddl": self.domain, "problem.pddl": self.problem}
+        write_texts(fspath(folder), texts)
+
+    def translate_plan(self, actions: Sequence[str]) -> tuple[Texts, ...]:
+        """Translate a plan of the exported problem, the names of its actions, into joint steps.
+
+        Raises `BadInput` as `joint_plan`, and `Refuted` if it is not optimal there.
+        """
+        plan = self.joint_plan(actions)
+        numbers = self.plans.of_steps(plan)
+        if numbers is None or self.plans.rank(numbers) is None:
+            raise Refuted(
+                f"this is no {self.model.kept_plan} of the exported problem",
+                remedy="Ask the planner for an optimal plan: the one of least total-cost.",
+            )
+        return texts(self.model, plan)
+
+    def translate_text(self, text: str, name: str) -> tuple[Texts, ...]:
+        """Translate the text of a plan file; ``name`` is what messages call it."""
+        position = Position(name)
+        only_one_plan(text, position)
+        try:
+            return self.translate_plan(plan_names(text))
+        except (BadInput, Refuted) as error:
+            error.position = error.position or position
+            raise
+
+    def data(self) -> dict[str, Any]:
+        """The PDDL, and what each action stands for, as ``--json`` has them."""
+        labels, robots = self.model.labels, self.model.robots
+        return {
+            "domain": self.domain,
+            "problem": self.problem,
+            "form": self.form,
+            "step_cost": self.classical.step_cost,
+            "optimal_cost": self.cost,
+            "robots": list(robots),
+            "actions": {
+                name: {robots[r]: labels[r][label] if label else None for r, label in chosen}
+                for name, chosen in self.labels.items()
+            },
+        }
 
     def joint_plan(self, names: Sequence[str]) -> Plan:
         """The joint plan that a plan of the exported problem stands for, given by its actions.

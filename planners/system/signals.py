@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from types import FrameType
 
-#: What ends a process, as a person, a terminal that closes and a scheduler of jobs send it.
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+#: What ends a process, as a person, a scheduler of jobs and a terminal (not on Windows) send it.
+ENDING = tuple(getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n))
 #: Seconds until an interrupt that Python lost is sent again.
 _SOON = 0.01
 

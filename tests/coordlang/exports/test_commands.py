@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 import coordlang as door
-from coordlang.commands.export import ExportedTask
+from coordlang.exports.pddl import ExportedTask
 from planners.classical.fast_downward import total_cost
 from planners.classical.task import action_names
 from planners.system.errors import UsageError

@@ -22,7 +22,7 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.words import Conjunction
 from coordlang.exports.ltlf import export_ltlf, symbols_of
 from coordlang.exports.membership import exclusive_terms, short_terms
-from coordlang.exports.pddl import PddlExport, plan_names
+from coordlang.exports.pddl import ExportedTask, plan_names
 from planners.classical.task import ClassicalTask, action_names
 from planners.joint.model import show
 from planners.pddl.model_options import ModelOptions
@@ -62,7 +62,7 @@ def rich() -> TaskLanguage:
     raise AssertionError("no such task")
 
 
-def planned(exported: PddlExport, plans: Iterable[Sequence[int]] | None = None) -> list[Plan]:
+def planned(exported: ExportedTask, plans: Iterable[Sequence[int]] | None = None) -> list[Plan]:
     """The joint plans of plans of an exported problem, by default of all optimal ones."""
     names = action_names(exported.classical)
     listed = optimal_plans(exported.classical) if plans is None else plans
@@ -78,7 +78,7 @@ def test_the_optimal_plans_are_the_plans_that_fit(
         for words, plans in islice(numbered_sentences(used).items(), 4):
             for form, limit in FORMS.items():
                 monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", limit)
-                exported = PddlExport(used, words)
+                exported = ExportedTask(used, words)
                 assert exported.classical.form == form
                 assert Counter(planned(exported)) == Counter(plans)
                 assert optimal_plans(exported.classical).cost == exported.cost
@@ -210,7 +210,7 @@ def test_plan_files_of_other_planners() -> None:
 
 def test_a_plan_that_is_cut_off_or_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", 0)
-    exported = PddlExport(rich(), max(numbered_sentences(rich()), key=len))
+    exported = ExportedTask(rich(), max(numbered_sentences(rich()), key=len))
     names = action_names(exported.classical)
     plan = [names[n] for n in next(iter(optimal_plans(exported.classical)))]
     whole = exported.joint_plan([name.upper() for name in plan])
@@ -266,7 +266,7 @@ def test_every_plan_within_slack_has_the_sentence(
         wanted = {plan[:n] for plan in plans for n in range(least[plan], len(plan) + 1)}
         for limit in FORMS.values():
             monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", limit)
-            exported = PddlExport(task_language, words)
+            exported = ExportedTask(task_language, words)
             assert Counter(planned(exported, every_plan(exported.classical))) == Counter(wanted)
             assert exported.cost == min(map(len, wanted))
 
@@ -275,4 +275,4 @@ def test_slack_that_pddl_cannot_say_is_refused() -> None:
     """Words that see what is left: tests/coordlang/commands/test_slack.py."""
     dear = within_slack("three-cells", 1, 1, cost="makespan+actions")
     with pytest.raises(UsageError, match="counts the joint steps"):
-        PddlExport(dear, [0])
+        ExportedTask(dear, [0])
