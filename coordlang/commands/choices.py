@@ -195,20 +195,19 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
 
 
 def _rows(used: TaskLanguage, own: RobotChoices) -> Iterator[tuple[str, str, str, list[str], str]]:
-    """The cells of each state; what may be done there is a list."""
+    """The cells of each state; what may be done there is a list.
+
+    What is known are the atoms that are true there, but not in all states of the step.
+    """
     automaton, nothing = own.automaton, _IDLING[used.model.unit]
+    texts = used.model.codec.facts.texts
     for step, layer in enumerate(automaton.layers[:-1], 1):
-        for state, atoms in zip(layer, _distinguishing(used, own, layer), strict=True):
+        known = [each.true for each in automaton.known[layer.start : layer.stop]]
+        everywhere = reduce(and_, known)
+        for state, true in zip(layer, known, strict=True):
+            knows = " ".join(texts[fact] for fact in bits(true & ~everywhere))
             moves = [
                 f"{used.model.label_text(own.robot, label) or nothing} -> {to}"
                 for label, to in automaton.moves[state].items()
             ]
-            yield str(step), str(state), f"{automaton.left[state]:,}", moves, atoms
-
-
-def _distinguishing(used: TaskLanguage, own: RobotChoices, states: range) -> list[str]:
-    """For each state of one step the atoms known to be true there, but not in all of them."""
-    texts = used.model.codec.facts.texts
-    known = [each.true for each in own.automaton.known[states.start : states.stop]]
-    everywhere = reduce(and_, known)
-    return [" ".join(texts[fact] for fact in bits(true & ~everywhere)) for true in known]
+            yield str(step), str(state), f"{automaton.left[state]:,}", moves, knows

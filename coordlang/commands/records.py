@@ -118,7 +118,7 @@ class CommandOptions:
     keeps_plans: ClassVar[bool] = True
     alone: ClassVar[str] = ""
     used: ClassVar[str] = ""
-    example: ClassVar[str] = ""
+    example: ClassVar[str] = "{MAP}"
 
     no_cache: bool = cli_option(False, "Search anew: read no plans that were found before.")
     limits: Limits = group(Limits)
@@ -250,7 +250,6 @@ class InspectOptions(
     doing="reading and grounding",
     keeps_plans=False,
     used="states write as_json",
-    example="{MAP}",
 ):
     """Show what was understood of a domain: robots, subactions, constraints."""
 
@@ -282,7 +281,6 @@ class CheckOptions(
     doing="solving the task twice",
     keeps_plans=False,
     used="as_json",
-    example="{MAP}",
 ):
     """Compare our optimal cost with Fast Downward's.
 
@@ -294,7 +292,6 @@ class CoordinationOptions(
     AnswerOptions,
     takes="DOMAIN PROBLEMS...",
     used="asynchronous jobs as_json",
-    example="{MAP}",
 ):
     """Decide which tasks require coordination, with a miscoordination shown."""
 
@@ -607,6 +604,7 @@ class ExplainOptions(
 class ReportOptions(
     PlanningOptions,
     takes="LANGUAGE DOMAIN PROBLEMS...",
+    module="explain",
     doing="drawing the page",
     used="output coordinates seed",
     example="t-map.json {MAP} -o t-map.html",

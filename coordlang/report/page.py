@@ -27,8 +27,7 @@ from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, place_layout
 from coordlang.report.plan import drawn_plan, heat_of
-from coordlang.report.shown import Selection, select_tasks
-from coordlang.report.task import Tables, task_data, task_summary
+from coordlang.report.task import Selection, Tables, select_tasks, task_data, task_summary
 from coordlang.sites.coordinates import Point
 from coordlang.sites.world import World, find_world
 from planners.joint.model import JointModel, own_text
@@ -277,7 +276,7 @@ def make_report(
     fewer if the page would have more than `LARGEST` bytes.  ``options`` say how the model is built
     (default: as the language file says), ``coordinates`` where places are.  ``position`` is what
     messages name as the place of the language.  Raises `OutOfMemory` if the page of a single task
-    would be too large, and what `coordlang.report.shown.select_tasks` raises.
+    would be too large, and what `coordlang.report.task.select_tasks` raises.
     """
     position, points = position or Position("the language file"), coordinates or {}
     options = options or options_of(language)

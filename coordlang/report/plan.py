@@ -16,7 +16,7 @@ from typing import Any
 
 from coordlang.language.recorded import recorded_candidates
 from coordlang.language.words import Language
-from coordlang.report.shown import Selection
+from coordlang.report.task import Selection
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import TooManyDivergences, divergences, minimal
 from coordlang.sites.coordinates import Point

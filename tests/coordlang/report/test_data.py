@@ -19,7 +19,7 @@ from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.sentences import sentence
 from coordlang.report import task as page_task
 from coordlang.report.page import make_report, page_data
-from coordlang.report.shown import select_tasks
+from coordlang.report.task import select_tasks
 from coordlang.required.miscoordination import Inseparable
 from planners.search.kept_plans import keeping_plans, plan_store
 from planners.search.plans import Plans

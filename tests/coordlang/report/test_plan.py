@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 from coordlang.report.plan import WIDTH, Heat, counted_heat, drawn_plan, floor_plan, heat_of
-from coordlang.report.shown import select_tasks
+from coordlang.report.task import select_tasks
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import Position
 from tests.coordlang.report.conftest import make_language
