@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib import import_module
+from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import click
@@ -47,6 +48,11 @@ class Command(click.Command):
         hidden = "" if record.keeps_plans else "no_cache"
         on_cli = [o for o in options_of(record) if o.only != "python" and o.name != hidden]
         self.record, self.on_cli = record, {each.name: each for each in on_cli}
+        #: The arguments beside domain and problems, and what is expected in all.
+        self.beside_pddl = [name for name in record.takes.split() if name not in _PDDL]
+        pddl = "DOMAIN PROBLEM" if self.beside_pddl else "them"
+        is_pddl = "factored" in self.on_cli
+        self.expected = record.takes + f", or --factored DIR without {pddl}" * is_pddl
         argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
         super().__init__(
             record.name,
@@ -111,28 +117,16 @@ class Command(click.Command):
                 said = f"{self.on_cli[alone].spelling} {self.on_cli[alone].metavar} alone"
                 raise click.UsageError(f"expected {said}, without {takes}")
             return {}
-        names = _beside_pddl(takes) if is_factored else takes.split()
+        names = self.beside_pddl if is_factored else takes.split()
         usage = " ".join(names)
         least, is_open = len(names) - usage.count("["), usage.endswith("...")
         most = len(arguments) if is_open else len(names)
         if not least <= len(arguments) <= most:
-            raise click.UsageError(f"expected {_usage(takes)}")
+            raise click.UsageError(f"expected {self.expected}")
         read: dict[str, object] = dict(zip(names, arguments, strict=False))
         if is_open:
             read[names[-1]] = arguments[len(names) - 1 :]
         return {name.strip("[]"): value for name, value in read.items()}
-
-
-def _beside_pddl(takes: str) -> list[str]:
-    """The arguments that there are beside domain and problems."""
-    return [name for name in takes.split() if name not in _PDDL]
-
-
-def _usage(takes: str) -> str:
-    beside = _beside_pddl(takes)
-    if beside == takes.split():
-        return takes
-    return f"{takes}, or --factored DIR without {'DOMAIN PROBLEM' if beside else 'them'}"
 
 
 @contextmanager
@@ -190,8 +184,6 @@ def _files(
         if each.is_output:
             outputs += _outputs(each, paths, each.files if makes_folder else ())
         elif each.name == "factored":
-            from pathlib import Path
-
             read += map(str, Path(paths[0]).glob("*.pddl"))
         elif _names_file(each):
             read += paths

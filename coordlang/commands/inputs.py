@@ -31,11 +31,6 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result")
 
-#: Options that are fixed in a loaded domain.
-_FIXED = frozenset(
-    {"cost", "unowned", "remember_actions", "slack", "words_see_slack", "asynchronous"}
-)
-
 
 def public(
     record: type[Any],
@@ -163,7 +158,8 @@ class Arguments:
             )
         # A language was built with the same options; its robots may be named there alone.
         options = self.loaded.options
-        return Source(None, options, _FIXED | ({"robots"} if options.names else set()))
+        fixed = {each.name for each in options_of(ModelOptions)} - {"robot_type"}
+        return Source(None, options, frozenset(fixed if options.names else fixed - {"robots"}))
 
     def instance(self) -> PlanningInstance:
         """The joint model and the tasks of the problems; what `load` has read is not read again."""

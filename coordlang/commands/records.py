@@ -290,7 +290,6 @@ class CheckOptions(
 
 class CoordinationOptions(
     AnswerOptions,
-    takes="DOMAIN PROBLEMS...",
     used="asynchronous jobs as_json",
 ):
     """Decide which tasks require coordination, with a miscoordination shown."""
@@ -317,7 +316,6 @@ class TasksOptions(
 
 class BuildOptions(
     AnswerOptions,
-    takes="DOMAIN PROBLEMS...",
     used="tasks method output",
     example="{MAP} --tasks all --method minimal -o t-map.json",
 ):
@@ -383,7 +381,6 @@ class VerifyOptions(
 
 class LiftOptions(
     AnswerOptions,
-    takes="DOMAIN PROBLEMS...",
     used="tasks check output",
     example="{GRID} --tasks all -o lifted.json",
 ):

@@ -18,7 +18,7 @@ it stays in states that the language maps.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from os import PathLike, fspath
@@ -321,34 +321,26 @@ class _Naming:
             for number, term in enumerate(self.tests[word], 1)
         ]
 
-    def following_actions(self) -> list[ClassicalAction]:
+    def following_actions(self) -> Iterator[ClassicalAction]:
         """Actions that stay at a word of the sentence or go on to the next one."""
-        found = []
         for number, (word, said) in enumerate(zip(self.words, self.said, strict=True)):
             named, place = self.named[word], f"word {number + 1} {self.names[word]}"
             if number:
-                before = self.said[number - 1]
-                here = ((named, True), (before, True))
-                found.append(
-                    _free(f"go on to {place}", here, (self.between, said), (named, before))
-                )
-            here = ((named, True), (said, True))
-            found.append(_free(f"stay in {place}", here, (self.between,), (named,)))
-        return [counted for action in found for counted in self._counted(action)]
+                here = (named, self.said[number - 1])
+                yield from self._counted(f"go on to {place}", here, (self.between, said), here)
+            yield from self._counted(f"stay in {place}", (named, said), (self.between,), (named,))
 
-    def _counted(self, action: ClassicalAction) -> list[ClassicalAction]:
+    def _counted(
+        self, name: str, true: Sequence[int], adds: Sequence[int], deletes: Sequence[int]
+    ) -> Iterator[ClassicalAction]:
         """An action after a joint step, once for each number of steps where they are counted."""
+        here = [(fact, True) for fact in true]
         if not self.taken:
-            return [action]
-        return [
-            _free(
-                f"{action.name} after step {number}",
-                (*action.preconditions, (before, True)),
-                (*action.adds, after),
-                (*action.deletes, before),
-            )
-            for number, (before, after) in enumerate(pairwise(self.taken), 1)
-        ]
+            yield _free(name, here, adds, deletes)
+        for number, (before, after) in enumerate(pairwise(self.taken), 1):
+            conditions = (*here, (before, True))
+            after_step = f"{name} after step {number}"
+            yield _free(after_step, conditions, (*adds, after), (*deletes, before))
 
     def goal(self) -> tuple[Condition, ...]:
         """The whole sentence is passed, and the last state is named, by ``reach the goal``, too."""

@@ -53,15 +53,13 @@ _EXAMPLES = 3
 MOST_PLACES = 600
 
 
-def page_data(
-    language: Language, selection: Selection, seed: int, known: Mapping[str, Point]
-) -> dict[str, Any]:
-    """Return the page's data for a language and the tasks to be shown.
+def page_data(selection: Selection, seed: int, known: Mapping[str, Point]) -> dict[str, Any]:
+    """Return the page's data for the tasks to be shown.
 
     ``seed`` is that of the plans drawn of large tasks, ``known`` are coordinates of places.
     """
     first = selection.tasks[0].language
-    model = first.model
+    model, language = first.model, first.language
     listed = _listed(language)
     tables = Tables(len(model.robots), listed)
     tasks = [task_data(shown, tables, seed) for shown in selection.tasks]
@@ -113,17 +111,15 @@ def _listed(language: Language) -> list[str]:
     return listed if len(listed) <= _STATES_LISTED and atoms <= _ATOMS_LISTED else []
 
 
-def word_rows(
-    language: Language, model: JointModel, lifted: LiftedWords | None
-) -> tuple[list[dict[str, Any]], bool]:
+def word_rows(used: TaskLanguage, lifted: LiftedWords | None) -> tuple[list[dict[str, Any]], bool]:
     """What the list of words shows, and whether formulas are to be read in its order.
 
     Of a word, ``terms`` are those of its formula, None if none was sought (then there are
     ``examples``), and ``rest`` says that the formula is "every other state".  ``lifted`` has the
     formulas of words that are functions of features.
     """
-    terms_of, others, in_order = _terms_of_words(language, model, lifted)
-    sizes = language.sizes()
+    terms_of, others, in_order = _terms_of_words(used, lifted)
+    language, sizes = used.language, used.language.sizes()
     largest = max([1, *sizes.values()])
     rows = []
     for word, terms in terms_of.items():
@@ -145,14 +141,15 @@ def word_rows(
 
 
 def _terms_of_words(
-    language: Language, model: JointModel, lifted: LiftedWords | None
+    used: TaskLanguage, lifted: LiftedWords | None
 ) -> tuple[Mapping[str, Sequence[str] | None], Sequence[str], bool]:
     """Terms by word (None: not sought), words that are "every other state", and if in order."""
+    language = used.language
     if lifted:
         return {word: lifted.terms.get(word, ()) for word in language.words}, (), False
     if not 0 < len(language.states) <= _STATES_EXPLAINED:
         return dict.fromkeys(language.words), (), False
-    mapped = mapped_states(language.partition(model), model)
+    mapped = mapped_states(used.partition, used.model)
     described = describe_words(mapped, all_covers(mapped))
     rules, in_order = described.rules, described.in_order
     terms_of = {word: [*map(term_text, cover.terms)] if cover else [] for word, cover in rules}
@@ -281,22 +278,22 @@ def make_report(
     position, points = position or Position("the language file"), coordinates or {}
     options = options or options_of(language)
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
-    model = selection.tasks[0].language.model
-    lifted = lifted_words(language, domain, problems[0], model, points, position)
-    rows, in_order = word_rows(language, model, lifted)
+    first = selection.tasks[0].language
+    lifted = lifted_words(language, domain, problems[0], first.model, points, position)
+    rows, in_order = word_rows(first, lifted)
     shown: dict[str, Any] = {
         "language": language,
         "domain": domain.name,
         "sha256": domain_sha256(domain),
         "problems": [problem.name for problem in problems],
-        "robots": model.robots,
+        "robots": first.model.robots,
         "words": rows,
         "in_order": in_order,
         "features": lifted.data()["features"] if lifted else (),
         "seed": seed,
         "is_mapped": all(task.language.is_mapped for task in selection.tasks),
     }
-    data = page_data(language, selection, seed, points)
+    data = page_data(selection, seed, points)
     heat = None
     if data["places"]:
         heat = heat_of(language, domain, problems, options, selection, position)
@@ -306,7 +303,7 @@ def make_report(
             raise OutOfMemory(what, remedy="Give a smaller problem.")
         half = selection.tasks[: len(selection.tasks) // 2]
         selection = replace(selection, tasks=half, complete=False)
-        data = page_data(language, selection, seed, points)
+        data = page_data(selection, seed, points)
     return Report(html, language, selection)
 
 

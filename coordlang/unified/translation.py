@@ -366,8 +366,6 @@ class _Writer:
 
     def effect(self, effect: Any, agent: Any) -> Iterator[str]:
         """An assignment: what it makes true and what false, each under its condition."""
-        if not effect.is_assignment():
-            raise refused(f"the effect {effect} is no assignment")
         when = [] if effect.condition.is_true() else [self.text(effect.condition, agent, True)]
         for literal, own, variables in self.cases(effect, agent):
             conditions = [*(b.atom for b in variables), *when, *own]

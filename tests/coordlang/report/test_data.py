@@ -118,7 +118,7 @@ def test_random_models() -> None:
             selection = select_tasks(language, domain, [problem], 4, seed)
         except (Inseparable, ProvedImpossible):
             continue
-        data = page_data(language, selection, seed, {})
+        data = page_data(selection, seed, {})
         made += 1
         unmapped += not data["places"]
         for task, shown in zip(data["tasks"], selection.tasks, strict=True):
