@@ -288,10 +288,7 @@ class CheckOptions(
     """
 
 
-class CoordinationOptions(
-    AnswerOptions,
-    used="asynchronous jobs as_json",
-):
+class CoordinationOptions(AnswerOptions, used="asynchronous jobs as_json"):
     """Decide which tasks require coordination, with a miscoordination shown."""
 
     work: Jobs = group(Jobs)

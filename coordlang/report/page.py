@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
-from importlib.resources import files
 from itertools import chain, islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -311,13 +312,12 @@ def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
     import jinja2
     from markupsafe import Markup
 
-    here = files("coordlang.report")
+    here = Path(__file__).parent
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     begin = "'use strict';\nconst DATA = JSON.parse(document.getElementById('data').textContent);"
-    scripts = [entry for entry in (here / "script").iterdir() if entry.name.endswith(".js")]
-    scripts.sort(key=lambda entry: entry.name)
+    scripts = sorted((here / "script").glob("*.js"))
     template = environment.from_string((here / "template.html").read_text("utf-8"))
     return template.render(
         version=version("coordlang"),
@@ -346,11 +346,7 @@ def _formula(text: str) -> Any:
     """Return a term with its ``and``, ``not`` and ``in`` set apart, as HTML."""
     from markupsafe import Markup, escape
 
-    pieces = []
-    for piece in str(escape(text)).split(" "):
-        if piece in ("and", "not", "in"):
-            piece = f"<i>{piece}</i>"
-        elif "-" in piece:  # names are not broken at their hyphens
-            piece = f"<span>{piece}</span>"
-        pieces.append(piece)
-    return Markup(f'<span class="formula">{" ".join(pieces)}</span>')
+    # Names are not broken at their hyphens.
+    html = re.sub(r"(?<!\S)\S*-\S*", r"<span>\g<0></span>", str(escape(text)))
+    html = re.sub(r"(?<!\S)(and|not|in)(?!\S)", r"<i>\1</i>", html)
+    return Markup(f'<span class="formula">{html}</span>')

@@ -66,7 +66,6 @@ _OPERATORS = {
     OperatorKind.EXISTS: "exists",
     OperatorKind.FORALL: "forall",
 }
-_QUANTIFIERS = ("exists", "forall")
 #: What an action is given, by the parameter, and an example.
 _EXAMPLES: dict[str, tuple[Any, str]] = {
     "subactions": (Mapping, '{"r1": "(move ?a ?b)"}'),
@@ -417,7 +416,7 @@ class _Writer:
         operator = _OPERATORS.get(node.node_type)
         if operator is None:
             raise refused(f"the expression {node}")
-        if operator in _QUANTIFIERS:
+        if node.is_exists() or node.is_forall():
             parts = [f"({self.declarations(node.variables())})", *parts]
         return _listed(operator, *parts)
 
