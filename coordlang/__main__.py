@@ -17,6 +17,10 @@ from planners.system.signals import Interruptions
 #: Digits of a number of plans: more than there are plans of any space that fits into memory.
 _DIGITS = 100_000
 
+#: New containers after which Python looks for garbage in cycles (700 if nothing is said): modules,
+#: ground actions and tables make many that stay, and hardly a cycle.
+_CONTAINERS = 50_000
+
 #: The exit code on a system that coordlang does not run on: that of what it relies on.
 _NOT_HERE = 32
 
@@ -28,6 +32,7 @@ def main() -> NoReturn:
     done is removed, and the exit code is 128 and the number of the signal.
     """
     interruptions = Interruptions()
+    gc.set_threshold(_CONTAINERS)
     # numpy's BLAS would start a thread for each core; what is multiplied here is small.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if 0 < sys.get_int_max_str_digits() < _DIGITS:  # 0: there is no limit
