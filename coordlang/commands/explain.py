@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang explain`` and ``report``: a language as a person reads it, as text and as a page."""
+"""``coordlang explain``: a language as a person reads it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from coordlang.commands.inputs import Arguments, coordinates_of, language_for, public
+from coordlang.commands.inputs import Arguments, coordinates_of, public
 from coordlang.commands.plans import plans_text
-from coordlang.commands.records import ExplainOptions, ReportOptions
-from coordlang.commands.terminal import covered_code, echo, warn_of_failures, working, write
+from coordlang.commands.records import ExplainOptions
+from coordlang.commands.terminal import covered_code, echo, warn_of_failures, working
 from coordlang.execution.best_sentence import leading_sentences
 from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.explanation import text as texts
@@ -21,11 +21,10 @@ from coordlang.explanation.demands import SentenceDemands, meaning, sentence_dem
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
 from coordlang.language.sentences import Sentence, TaskSentence, number_of_sentences, task_sentences
-from coordlang.report.page import Report, make_report
 from planners.joint.model import show
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
-from planners.system.messages import counted, visible
+from planners.system.messages import counted
 
 #: Sentences of a task that the text lists.
 SENTENCES_SHOWN = 10
@@ -234,32 +233,3 @@ def show_explain(found: Explanation, options: ExplainOptions) -> int:
         return covered_code(found)
     warn_of_failures(found.tolerance)
     return 0
-
-
-@public(ReportOptions)
-def report(arguments: Arguments, options: ReportOptions) -> Report:
-    """Make the page of a language: its words, and sentences and plans of tasks."""
-    files = arguments.read()
-    points = coordinates_of(options.coordinates, files.problems[0])
-    read, position = language_for(arguments.needed("LANGUAGE"), files, coordinates=points)
-    return make_report(
-        read,
-        files.domain,
-        files.problems,
-        seed=options.seed,
-        options=files.options_of(read),
-        coordinates=points,
-        position=position,
-    )
-
-
-def show_report(page: Report, options: ReportOptions) -> None:
-    """Write the page."""
-    output, others = options.output, page.selection.others
-    candidates = int(page.language.provenance.tasks.get("count", 0))
-    shown = f"{counted(len(page.selection.tasks) - others, 'task')} of {candidates:,}"
-    if others:
-        shown += f" and {counted(others, 'other')}"
-    place = "stdout" if output == "-" else visible(output)
-    write(page.html, output, f"{shown}, {len(page.html):,} bytes, written to {place}")
-    warn_of_failures(page.language.tolerance)

@@ -598,7 +598,6 @@ class ExplainOptions(
 class ReportOptions(
     PlanningOptions,
     takes="LANGUAGE DOMAIN PROBLEMS...",
-    module="explain",
     doing="drawing the page",
     used="output coordinates seed",
     example="t-map.json {MAP} -o t-map.html",
