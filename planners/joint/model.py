@@ -138,7 +138,7 @@ class Stepper(ABC):
         return iter(())
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class JointModel:
     """A joint model ``M = (P, A)`` (the paper, section 2) over the robots of one problem.
 

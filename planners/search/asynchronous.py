@@ -277,34 +277,28 @@ class _Unfolding:
 class _Waits:
     """Counts of events that others wait for.
 
-    ``none``: (columns) no event was met; a column is a pair of robots and what events of the one
-    may wait for.  ``matter``: (nodes, columns) whether some event after a node may wait for such
-    events.  ``acting``: by node, for each robot whether it has events to come.
+    ``none``: (columns) no event was met; a column is a robot's label, and another robot for whose
+    events it may wait.  ``matter``: (nodes, columns) whether some event after a node may wait for
+    such events.  ``acting``: by node, for each robot whether it has events to come.
     """
 
     def __init__(self, space: PlanSpace, traces: Traces) -> None:
         robots = range(space.robots)
         future = [_future(space, robot) for robot in robots]
         self.acting: list[list[bool]] = np.stack([own.any(axis=1) for own in future], 1).tolist()
-        self._column: dict[tuple[int, int], list[int]] = {}
-        matter, added = [np.zeros((len(space), 0), np.bool_)], []
-        width = 0
-        for i, j in permutations(robots, 2):
-            used = np.unique(space.robot_labels(i))
-            table: Bools = traces.interfering[i, j].copy()
-            table[np.setdiff1d(np.arange(len(table)), used)] = False
-            patterns, pattern = np.unique(table, axis=0, return_inverse=True)
-            pattern = pattern.reshape(-1)
-            self._column[i, j] = (width + pattern).tolist()
-            of_label = pattern[:, None] == np.arange(len(patterns))
-            matter.append(future[i] @ (of_label & patterns.any(axis=1)))
-            added.append((j, slice(width, width + len(patterns)), patterns))
-            width += len(patterns)
-        self.matter = np.concatenate(matter, axis=1).astype(np.int16)
+        used = [np.unique(space.robot_labels(robot)) for robot in robots]
+        width = (space.robots - 1) * sum(map(len, used))
         self.none: Ints = np.zeros(width, np.int16)
+        self.matter: Bools = np.zeros((len(space), width), np.bool_)
         self._by_label = [np.zeros((len(names), width), np.int16) for names in space.model.labels]
-        for j, columns, patterns in added:
-            self._by_label[j][:, columns] = patterns.T
+        self._column: dict[tuple[int, int], dict[int, int]] = {}
+        columns = range(0)
+        for i, j in permutations(robots, 2):
+            columns = range(columns.stop, columns.stop + len(used[i]))
+            waits = traces.interfering[i, j][used[i]]
+            self.matter[:, columns] = future[i][:, used[i]] & waits.any(axis=1)
+            self._by_label[j][:, columns] = waits.T
+            self._column[i, j] = dict(zip(used[i].tolist(), columns, strict=True))
         #: (columns) what the events of a step add.
         self.added = cache(self._sum)
 

@@ -12,12 +12,11 @@ is answered with yes: more is searched then.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 
 import numpy as np
 
-from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask, products, some_options
 from planners.joint.tables import Bools, Ints
@@ -193,10 +192,11 @@ class ExactQuestion:
                 return None
             plan = plans.labels_chosen()
             plans.simplify()
-            if max(int(costs.max(initial=0)) for costs in _label_costs(model)) == 1:
+            costs = self._formula.stepper.costs
+            if max(int(own.max(initial=0)) for own in costs) == 1:
                 plans.left = _LEAST_COST
                 with suppress(OutOfEffort):
-                    cheap = _least_cost(plans, model, self._task)
+                    cheap = _least_cost(plans, _costly(plans, model, self._task, costs))
                     plan = plans.labels_chosen()
                     plans.require(cheap)
             used = _used(plans, model, plan, pieces.question)
@@ -256,16 +256,11 @@ def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list
 # ---- the least second component, by cores
 
 
-def _label_costs(model: JointModel) -> list[Ints]:
-    """Per robot the second cost component of each of its labels."""
-    assert isinstance(model.stepper, ComposingStepper)
-    return model.stepper.costs
-
-
-def _least_cost(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Literals:
+def _least_cost(plans: FixedPlans, costly: Iterable[Literals]) -> Literals:
     """Literals that all hold in the cheapest plans, and in no other plans.
 
-    There are plans, and costs are 0 or 1.  The last answer of the solver is one of the cheapest.
+    There are plans, costs are 0 or 1, and ``costly`` is from `_costly`.  The last answer of the
+    solver is one of the cheapest.
     First the cost is assumed to be 0: no action that costs something is done.  The solver answers
     with a core, some of these assumptions that cannot hold together.  Each core raises the lower
     bound by one, and from then on one of its actions may be done, and for more there are new
@@ -279,7 +274,7 @@ def _least_cost(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Lit
     """
     #: What is assumed to be false: that an action is done at all, and that more of some literals
     #: hold than the place of this one in their counter.
-    done = {plans.any_of(times): times for times in _costly(plans, model, task)}
+    done = {plans.any_of(times): times for times in costly}
     more: dict[int, tuple[Literals, int]] = {}
 
     def assume_at_most(place: int, counter: Literals) -> None:
@@ -299,16 +294,17 @@ def _least_cost(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Lit
     return [-literal for literal in sorted({*done, *more})]
 
 
-def _costly(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Iterable[Literals]:
+def _costly(
+    plans: FixedPlans, model: JointModel, task: PlanningTask, costs: Sequence[Ints]
+) -> Iterable[Literals]:
     """For each action that costs something the literals that it is done, in any step.
 
     By any of the robots that are alike: which one of them does it does not matter.
     """
     kinds = _kinds(model, task)
     alike: dict[tuple[str, ...], Literals] = {}
-    for robot, costs in enumerate(_label_costs(model)):
-        own = model.robots[robot]
-        for label in np.flatnonzero(costs).tolist():
+    for robot, own in enumerate(model.robots):
+        for label in np.flatnonzero(costs[robot]).tolist():
             words = model.labels[robot][label].strip("()").split()
             action = tuple(kinds[robot] if word == own else word for word in words)
             times = [plans.label(step, robot, label) for step in range(plans.steps)]

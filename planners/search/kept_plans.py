@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,23 +31,11 @@ _MOST_BYTES = 2**30
 _KEPT = ("rows", "state", "layer", "first", "target", "labels", "cost", "starts", "second")
 
 
-@dataclass(slots=True)
-class _Cache:
-    """A store, and the digests of the models that were asked about: each is made once."""
-
-    store: Store
-    digests: dict[int, tuple[JointModel, str]] = field(default_factory=dict)
-
-    def key(self, model: JointModel, task: PlanningTask) -> str:
-        found = self.digests.get(id(model))
-        if found is None:
-            found = self.digests[id(model)] = model, model_digest(model)
-        return key_of(found[1], task)
-
-
-#: What the code inside a `keeping_plans` block uses.  Outside there is none: a library looks into
-#: no folder of its user's unasked.
-_USED: ContextVar[_Cache | None] = ContextVar("plans that are kept", default=None)
+#: The store that a `keeping_plans` block uses, and its `model_digest`, which looks at each model
+#: once.  Outside there is none: a library looks into no folder of its user's unasked.
+_USED: ContextVar[tuple[Store, Callable[[JointModel], str]] | None] = ContextVar(
+    "plans that are kept", default=None
+)
 
 
 def plan_store(folder: pathlib.Path) -> Store:
@@ -84,7 +72,7 @@ def default_folder(environment: Mapping[str, str] = os.environ) -> pathlib.Path 
 @contextmanager
 def keeping_plans(store: Store | None) -> Iterator[None]:
     """Let `search` use a store inside of the block; None: no store."""
-    token = _USED.set(None if store is None else _Cache(store))
+    token = _USED.set(None if store is None else (store, cache(model_digest)))
     try:
         yield
     finally:
@@ -94,7 +82,7 @@ def keeping_plans(store: Store | None) -> Iterator[None]:
 def store_in_use() -> Store | None:
     """The store that `search` uses here, to be used in other processes, too."""
     used = _USED.get()
-    return None if used is None else used.store
+    return None if used is None else used[0]
 
 
 def search(model: JointModel, task: PlanningTask) -> PlanSpace:
@@ -109,7 +97,8 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
     used = _USED.get()
     if used is None:
         return optimal_plans.search(model, task)
-    key, store = used.key(model, task), used.store
+    store, digest_of = used
+    key = key_of(digest_of(model), task)
     table = store.read(key)
     if table is not None:  # the plan space of the task, as the hash of its entry says
         goal = np.zeros(len(table["state"]), np.int64)

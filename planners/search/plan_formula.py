@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class PlanFormula:
-    """The clauses of one ``step`` of a plan of a task, and of its goal.
+    """The clauses of one ``step`` of a plan of a task, and of its goal, over ``stepper``'s labels.
 
     Variable k (from 1) of a step is fact k - 1, true in the state before it, then come labels,
     robot by robot, then helping variables; ``size`` is how many there are.  ``size + k`` is
@@ -44,7 +44,7 @@ class PlanFormula:
     def __init__(self, model: JointModel, task: PlanningTask) -> None:
         stepper = model.stepper
         assert isinstance(stepper, ComposingStepper)
-        self._model, self._stepper, facts = model, stepper, len(model.codec.facts)
+        self._model, self.stepper, facts = model, stepper, len(model.codec.facts)
         *self._first_label, end = accumulate(map(len, model.labels), initial=facts + 1)
         self.size = end - 1
         self.step: list[tuple[int, ...]] = []
@@ -162,7 +162,7 @@ class PlanFormula:
 
     def _apart(self, i: int, j: int) -> None:
         """Labels that may not share a step; those that exclude the same ones are one class."""
-        rows, row_class = _unique(~self._stepper.tables[i, j])
+        rows, row_class = _unique(~self.stepper.tables[i, j])
         columns, column_class = _unique(rows.T)
         theirs = [0] * len(columns)
         for one, apart in enumerate(columns.T):

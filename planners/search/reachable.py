@@ -21,7 +21,7 @@ T = TypeVar("T", bound=np.generic)
 Only = Callable[[Ints, Rows, Options], Options]
 
 #: States expanded first; from the joint steps that they have the next numbers of states follow.
-_FIRST = 500
+_FIRST = 8
 #: Bytes of the states that joint steps lead to, composed at a time.
 _BYTES = 1 << 28
 #: States that are looked up at a time.
@@ -177,8 +177,6 @@ def joined_edges(parts: Sequence[Edges], robots: int) -> Edges:
     """Parts of the steps between two layers together."""
     none = np.zeros(0, np.int8)
     every = [Edges(none, none, np.zeros((0, robots), np.int8), none), *parts]
-    if len(parts) == 1:
-        return parts[0]
     return Edges(*map(np.concatenate, zip(*every, strict=True)))
 
 
@@ -214,16 +212,15 @@ class Exploration:
         return sum(map(len, self.layers))
 
     def steps(
-        self, only: Only | None = None, first: int = _FIRST, most: int | None = None
+        self, only: Only | None = None, most: int | None = None
     ) -> Iterator[tuple[Ints, Steps]]:
         """The joint steps out of the last layer, in pieces, with the states that each begins from.
 
-        The first piece are ``first`` states; how many steps these have says how long the next
-        pieces may be, to have ``most`` each.
+        How many steps a piece has says how long the next one may be, to have ``most``.
         """
         room = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
         most = min(room, most or room)
-        states, start, size = self.layers[-1], 0, min(self._pieces.states, first)
+        states, start, size = self.layers[-1], 0, min(self._pieces.states, _FIRST)
         while start < len(states):
             numbers = states[start : start + size]
             chosen = None if only is None else partial(only, numbers)
