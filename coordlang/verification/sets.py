@@ -27,7 +27,7 @@ import numpy as np
 from coordlang.required.miscoordination import Trail
 from coordlang.verification.parting import label_sequences
 from planners.joint.tables import Ints
-from planners.search.edge_index import EdgeTrees
+from planners.search.edge_index import edge_trees
 from planners.search.plan_space import PlanSpace
 from planners.system.limits import reaching
 
@@ -181,7 +181,7 @@ class SetWalk:
         self._said = [self._sentences.silence]
         #: Of sets of steps and of sentences the steps along which some of these are said.
         self._able_to_say: dict[tuple[int, int], int] = {}
-        self._edges = EdgeTrees(space)
+        self._edges = edge_trees(space)
 
         def so_far() -> str:
             return f"{len(self._steps.moves):,} sets of what robots can do and say"
@@ -330,7 +330,7 @@ class SetWalk:
         step is not among them.  ``common``: the sentences that all can say before.
         """
         options = [self._options(*own) for own in ahead]
-        todo: list[tuple[Steps, _Ahead, int, Any]] = [((), ahead, common, self._edges.of(node))]
+        todo: list[tuple[Steps, _Ahead, int, Any]] = [((), ahead, common, self._edges(node))]
         while todo:
             steps, reached, left, edges = todo.pop()
             robot = len(steps)

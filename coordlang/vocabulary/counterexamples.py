@@ -25,7 +25,7 @@ from coordlang.required.choices import Choices
 from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.spoken_choices import NOTHING, SpokenChoices, Words
 from planners.joint.tables import Ints
-from planners.search.edge_index import EdgeTrees
+from planners.search.edge_index import edge_trees
 
 #: Ways to a failing step that are taken from one node at most, beside the first.
 _RANDOM_WAYS = 40
@@ -55,7 +55,7 @@ class Mixtures:
 
     def __init__(self, choices: Choices) -> None:
         self._choices, self._space = choices, choices.space
-        self._edges = EdgeTrees(choices.space)
+        self._edges = edge_trees(choices.space)
         #: From which nodes mixtures have failed, and under how many words.
         self._failed = Counter[int]()
         self._forget()
@@ -135,7 +135,7 @@ class Mixtures:
     def _after_step(self, node: int, ahead: _Ahead, random: Random | None) -> _Failing | None:
         """The mixture that fails after one of the next steps, or by it."""
         self._visited += 1
-        left, edges = self._common(ahead), self._edges.of(node)
+        left, edges = self._common(ahead), self._edges(node)
         for codes, following, target in self._moves(edges, ahead, left, random):
             if target is None:
                 common = self._common(following)

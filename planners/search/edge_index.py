@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -47,23 +48,22 @@ class EdgeIndex:
         return find_rows(self.keys[robot][:, None], wanted[:, None])
 
 
-class EdgeTrees:
+def edge_trees(space: PlanSpace) -> Callable[[int], dict[int, Any]]:
     """The targets of each node's edges, by the robots' labels one after another.
 
-    A tree for each node, made when it is asked for: robot 1's label -> robot 2's -> .. -> target.
+    A tree for each node, made when it is asked for: robot 1's label -> robot 2's -> .. -> target; a
+    label that no edge has, after those before it, is not in it.
     """
 
-    def __init__(self, space: PlanSpace) -> None:
-        self._space = space
-        #: The tree of a node; a label that no edge has, after those before it, is not in it.
-        self.of = cache(self._tree)
-
-    def _tree(self, node: int) -> dict[int, Any]:
+    @cache
+    def tree_of(node: int) -> dict[int, Any]:
         tree: dict[int, Any] = {}
-        for edge in self._space.out_edges(node):
-            *first, last = self._space.labels_of(edge)
+        for edge in space.out_edges(node):
+            *first, last = space.labels_of(edge)
             at = tree
             for label in first:
                 at = at.setdefault(label, {})
-            at[last] = self._space.target_of(edge)
+            at[last] = space.target_of(edge)
         return tree
+
+    return tree_of

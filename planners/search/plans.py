@@ -31,17 +31,14 @@ def counts(space: PlanSpace) -> list[int]:
     """For each node the exact number of optimal plans from it, as big integers.
 
     Plans are different sequences of joint *actions*; they may pass through the same states.
-    O(edges) additions: in 64 bits as long as they fit, then in Python integers.
+    O(edges) additions.
     """
-    values = np.ones(len(space), np.int64)
+    values = np.ones(len(space), np.object_)
     for nodes, edges in zip(space.layers[1:], space.edges_by_layer(), strict=True):
-        addends = values[edges.target]
-        if values.dtype != object and addends.astype(np.float64).sum() > 2.0**62:
-            values = values.astype(object)
-            addends = addends.astype(object)
         first = np.searchsorted(edges.source, np.arange(nodes.start, nodes.stop))
-        values[nodes] = np.add.reduceat(addends, first)
-    return [int(v) for v in values]
+        values[nodes] = np.add.reduceat(values[edges.target], first)
+    found: list[int] = values.tolist()
+    return found
 
 
 @dataclass(frozen=True)
