@@ -200,17 +200,10 @@ class ComposingStepper(Stepper):
             )
 
     def _apply(self, rows: Rows, source: Ints, labels: Labels) -> tuple[Rows, Ints]:
-        # Joint steps that begin alike stand together: what the first robots do is the same.
-        begins, run, result = differs(source), source, rows
-        cost = np.zeros(len(source), np.int64)
-        for i, robot in enumerate(self._robot):
-            mine = labels[:, i]
-            begins |= differs(mine)
-            first = np.flatnonzero(begins)
-            result = result[run[first]]
-            run = np.cumsum(begins) - 1
-            result &= ~robot.operators.deletes[mine[first]]
-            result |= robot.operators.adds[mine[first]]
+        result, cost = rows[source], np.zeros(len(source), np.int64)
+        for robot, mine in zip(self._robot, labels.T, strict=True):
+            result &= ~robot.operators.deletes[mine]
+            result |= robot.operators.adds[mine]
             cost += robot.cost[mine]
         if any(robot.operators.conditional for robot in self._robot):
             adds, deletes = np.zeros_like(result), np.zeros_like(result)
