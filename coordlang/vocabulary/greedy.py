@@ -8,7 +8,8 @@ docs/concepts.md).
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
 
 from coordlang.language.warping import Clause, Pair, pair
 from coordlang.vocabulary.job import Assignment, Job, Outcome
@@ -67,20 +68,23 @@ def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -
     for a, b in clashing(constraints):
         clashes[a].add(b)
         clashes[b].add(a)
-    several = _Alternatives([own for own in constraints if len(own) > 1])
+    of_state = defaultdict[int, list[Constraint]](list)
+    for own in constraints:
+        if len(own) > 1:
+            for state in {state for pairs in own for state in chain(*pairs)}:
+                of_state[state].append(own)
     words: dict[int, int] = {}
     waiting = list(states)
     number = 0
     while waiting:
-        members: list[int] = []
         blocked: set[int] = set()
         left = []
         for state in waiting:
-            if state in blocked or not several.merge(state, members):
+            words[state] = number
+            if state in blocked or any(_is_broken(own, words) for own in of_state[state]):
+                del words[state]
                 left.append(state)
                 continue
-            words[state] = number
-            members.append(state)
             blocked |= clashes[state]
         waiting = left
         number += 1
@@ -92,32 +96,8 @@ def clashing(constraints: Iterable[Constraint]) -> set[Pair]:
     return {states for own in constraints if len(own) == 1 for states in own[0]}
 
 
-class _Alternatives:
-    """Constraints with several alternatives; two states in one word rule out some of them.
-
-    ``_left`` of each constraint the alternatives that are not ruled out, ``_ruled_out_by`` for each
-    pair of states the alternatives (with their constraints' numbers) that separate it.
-    """
-
-    def __init__(self, constraints: Sequence[Constraint]) -> None:
-        self._left = list(map(set, constraints))
-        self._ruled_out_by: dict[tuple[int, int], list[tuple[int, Clause]]] = defaultdict(list)
-        for number, alternatives in enumerate(constraints):
-            for separation in alternatives:
-                for states in separation:
-                    self._ruled_out_by[states].append((number, separation))
-        self._states = {state for states in self._ruled_out_by for state in states}
-
-    def merge(self, state: int, members: Sequence[int]) -> bool:
-        """Put ``state`` into a word with ``members`` if every constraint keeps an alternative."""
-        if state not in self._states:
-            return True
-        ruled_out: dict[int, set[Clause]] = {}
-        for other in members:
-            for number, separation in self._ruled_out_by.get(pair(state, other), ()):
-                ruled_out.setdefault(number, set()).add(separation)
-        if any(self._left[number] <= out for number, out in ruled_out.items()):
-            return False
-        for number, out in ruled_out.items():
-            self._left[number] -= out
-        return True
+def _is_broken(constraint: Constraint, words: Mapping[int, int]) -> bool:
+    """Whether each alternative has a pair of states that have one word by now."""
+    return all(
+        any(a in words and words[a] == words.get(b) for a, b in pairs) for pairs in constraint
+    )
