@@ -225,7 +225,6 @@ class _Image:
 
     def __init__(self, renaming: Renaming, facts: Sequence[Atom]) -> None:
         self._renaming, self._facts = renaming, facts
-        self._atoms: dict[Atom | StepAtom, Atom | StepAtom] = {}
 
     def name(self, name: str) -> str:
         return self._renaming.get(name, name)
@@ -234,11 +233,9 @@ class _Image:
         return tuple(map(self.name, names))
 
     def leaf(self, leaf: Leaf) -> Leaf:
-        if not isinstance(leaf, Atom | StepAtom):
-            return leaf
-        if leaf not in self._atoms:
-            self._atoms[leaf] = replace(leaf, args=self.names(leaf.args))
-        return self._atoms[leaf]
+        if isinstance(leaf, Atom | StepAtom):
+            return replace(leaf, args=self.names(leaf.args))
+        return leaf
 
     def form(self, formula: Goal) -> Hashable:
         """A goal or formula; the order of the parts of a conjunction or disjunction is gone."""

@@ -63,8 +63,6 @@ class Mixtures:
     def _forget(self) -> None:
         self._spoken = SpokenChoices(self._choices)
         self._safe: set[tuple[int, _Ahead]] = set()
-        self._shared: dict[_Ahead, int] = {}
-        self._options: dict[tuple[Words, int], list[_Option]] = {}
 
     def failing(self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize) -> list[Ints]:
         """Failing tuples of plans with one sentence, one table for each number of steps.
@@ -78,7 +76,7 @@ class Mixtures:
         times as many are wanted from each node: it stands for so many images.  ``steps``: steps of
         robots that may be looked at.  Raises `Undecided` after so many steps.
         """
-        if len(self._shared) + len(self._safe) + len(self._options) + len(self._spoken) > _KEPT:
+        if len(self._safe) + len(self._spoken) > _KEPT:
             self._forget()
         self._spoken.say(word)
         #: How often the next steps of a mixture were looked at, and steps of robots that may be.
@@ -183,24 +181,20 @@ class Mixtures:
 
     def _options_of(self, ahead: tuple[Words, int]) -> list[_Option]:
         """The next steps of a robot that has said some words and has a set."""
-        known = self._options.get(ahead)
-        if known is None:
-            spoken, (words, own) = self._spoken, ahead
-            known = self._options[ahead] = []
-            for code, label, entered, after in spoken.steps(own):
-                said = words + entered
-                sentences = spoken.words.before(said, spoken.sentences(after))
-                known.append((label, code, (said, after), sentences))
-        return known
+        spoken, (words, own) = self._spoken, ahead
+        found = []
+        for code, label, entered, after in spoken.steps(own):
+            said = words + entered
+            sentences = spoken.words.before(said, spoken.sentences(after))
+            found.append((label, code, (said, after), sentences))
+        return found
 
     def _common(self, ahead: _Ahead) -> int:
         """The sentences that all robots can say."""
-        known = self._shared.get(ahead)
-        if known is None:
-            sets = self._spoken.words
-            own = (sets.before(said, self._spoken.sentences(after)) for said, after in ahead)
-            known = self._shared[ahead] = reduce(sets.common, own)
-        return known
+        sets = self._spoken.words
+        return reduce(
+            sets.common, (sets.before(said, self._spoken.sentences(own)) for said, own in ahead)
+        )
 
     # ---- plans of a mixture
 
@@ -222,13 +216,11 @@ class Mixtures:
 
     def _fails(self, node: int, plans: _Plans) -> bool:
         """Whether the mixture of each robot's part of its plan fails."""
-        for edges in zip(*plans, strict=True):
-            labels = tuple(self._space.labels_of(edge)[n] for n, edge in enumerate(edges))
-            target = self._choices.edges_of(node).get(labels)
-            if target is None:
-                return True
-            node = target
-        return False
+        steps = [
+            [self._space.labels_of(edge)[robot] for robot, edge in enumerate(edges)]
+            for edges in zip(*plans, strict=True)
+        ]
+        return self._space.path_with(node, steps) is None
 
     def _others(self, node: int, most: int, random: Random) -> set[_Plans]:
         """More plans of mixtures from a node of which one fails, in ``most`` draws at most."""
