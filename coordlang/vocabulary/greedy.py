@@ -68,11 +68,7 @@ def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -
     for a, b in clashing(constraints):
         clashes[a].add(b)
         clashes[b].add(a)
-    of_state = defaultdict[int, list[Constraint]](list)
-    for own in constraints:
-        if len(own) > 1:
-            for state in {state for pairs in own for state in chain(*pairs)}:
-                of_state[state].append(own)
+    of_state = _with_a_choice(constraints)
     words: dict[int, int] = {}
     waiting = list(states)
     number = 0
@@ -81,7 +77,7 @@ def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -
         left = []
         for state in waiting:
             words[state] = number
-            if state in blocked or any(_is_broken(own, words) for own in of_state[state]):
+            if state in blocked or any(_is_broken(own, words) for own in of_state.get(state, ())):
                 del words[state]
                 left.append(state)
                 continue
@@ -94,6 +90,16 @@ def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -
 def clashing(constraints: Iterable[Constraint]) -> set[Pair]:
     """The pairs of states that constraints without a choice separate."""
     return {states for own in constraints if len(own) == 1 for states in own[0]}
+
+
+def _with_a_choice(constraints: Iterable[Constraint]) -> Mapping[int, list[Constraint]]:
+    """By state the constraints with a choice that speak of it."""
+    of_state = defaultdict[int, list[Constraint]](list)
+    for own in constraints:
+        if len(own) > 1:
+            for state in set(chain(*chain(*own))):
+                of_state[state].append(own)
+    return of_state
 
 
 def _is_broken(constraint: Constraint, words: Mapping[int, int]) -> bool:
