@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 _NEVER = np.iinfo(np.int32).max
 #: In place of the layer of a state: no optimal plan passes through it.
 _LEFT_OUT = -1
+#: States expanded first where the joint steps are limited.
+_FIRST_PROBED = 8
 #: Labels in all steps for which the solver's formula takes as long as the steps that are tried
 #: before it is asked; steps that are counted where nothing bounds them.
 _FORMULA, _STEPS = 50_000, 20
@@ -58,7 +60,7 @@ class _GrownError(Exception):
 class BoundedSearch(Exploration):
     """Layers of states within a bound that grows until the goal is met.
 
-    ``table`` has the states that were met in all rounds, in which so many joint steps were
+    ``table`` has the states that were met in all ``rounds``, in which so many joint steps were
     ``composed``; ``layers`` are those of the last round, the start first (goal states are in the
     last layer), and ``edges[k]`` lead from layer k to the next one.
     """
@@ -72,7 +74,7 @@ class BoundedSearch(Exploration):
     ) -> None:
         super().__init__(model, task.init[None, :], pieces)
         self._task, self._heuristic = task, heuristic
-        self.bound = 0
+        self.rounds = self.bound = 0
         #: The least makespan that is not refuted: where rounds are left out, ``bound`` is larger.
         self._least = 0
         #: Per state the lower bound, and the layer that it was met in, in this round.
@@ -186,6 +188,7 @@ class BoundedSearch(Exploration):
 
     def _round(self) -> int | None:
         """Search within the bound; the least that was too large, None once the goal is met."""
+        self.rounds += 1
         self._depth[:] = _NEVER
         self._depth[0] = 0
         self.layers, self.edges = self.layers[:1], []
@@ -246,7 +249,7 @@ class BoundedSearch(Exploration):
             beyond = min(beyond, low + depth)
             return options
 
-        for numbers, steps in self.steps(only, self._probe if self._limited else None):
+        for numbers, steps in self.steps(only, *((_FIRST_PROBED, self._probe) * self._limited)):
             if self._limited and len(steps) > self._probe:
                 raise _GrownError  # bounds of so many states take long
             before = len(self.table)

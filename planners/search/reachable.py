@@ -21,7 +21,7 @@ T = TypeVar("T", bound=np.generic)
 Only = Callable[[Ints, Rows, Options], Options]
 
 #: States expanded first; from the joint steps that they have the next numbers of states follow.
-_FIRST = 8
+_FIRST = 500
 #: Bytes of the states that joint steps lead to, composed at a time.
 _BYTES = 1 << 28
 #: States that are looked up at a time.
@@ -212,15 +212,16 @@ class Exploration:
         return sum(map(len, self.layers))
 
     def steps(
-        self, only: Only | None = None, most: int | None = None
+        self, only: Only | None = None, first: int = _FIRST, most: int | None = None
     ) -> Iterator[tuple[Ints, Steps]]:
         """The joint steps out of the last layer, in pieces, with the states that each begins from.
 
-        How many steps a piece has says how long the next one may be, to have ``most``.
+        The first piece are ``first`` states; how many steps these have says how long the next
+        pieces may be, to have ``most`` each.
         """
         room = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
         most = min(room, most or room)
-        states, start, size = self.layers[-1], 0, min(self._pieces.states, _FIRST)
+        states, start, size = self.layers[-1], 0, min(self._pieces.states, first)
         while start < len(states):
             numbers = states[start : start + size]
             chosen = None if only is None else partial(only, numbers)
