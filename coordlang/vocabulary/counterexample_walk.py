@@ -10,6 +10,7 @@ whatever the words are (Proposition 14 of docs/concepts.md), and where sentences
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -79,8 +80,8 @@ class CounterexampleWalk:
         self._choices, self._space = choices, choices.space
         self._index = EdgeIndex.of(choices.space)
 
-    def failing(self, word: Ints, most: int, ways: int = 1) -> list[Ints]:
-        """See `Mixtures.failing`: the fewest differences, and drawn ones."""
+    def failing(self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize) -> list[Ints]:
+        """See `Mixtures.failing`: the fewest differences, and drawn ones, whatever ``steps``."""
         layers, most = self._layers(word), max(most, _LEAST)
         # Columns: fewest steps at which the plans differ, steps to go, row of the layer.
         starts = [np.zeros((0, 3), np.int64)]

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from coordlang.required.choices import Choices
+from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.spoken_choices import NOTHING, SpokenChoices, Words
 from planners.joint.tables import Ints
 from planners.search.edge_index import edge_trees
@@ -63,7 +64,7 @@ class Mixtures:
         self._spoken = SpokenChoices(self._choices)
         self._safe: set[tuple[int, _Ahead]] = set()
 
-    def failing(self, word: Ints, most: int, ways: int = 1) -> list[Ints]:
+    def failing(self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize) -> list[Ints]:
         """Failing tuples of plans with one sentence, one table for each number of steps.
 
         A table (tuples, steps, robots) has step by step the edge of each plan.
@@ -72,13 +73,14 @@ class Mixtures:
 
         ``word``: (nodes) the word of each node of the plan space.  ``most``: about how many are
         wanted.  If there is none at all, ``word`` is a language for the tasks.  ``ways``: so many
-        times as many are wanted from each node: it stands for so many images.
+        times as many are wanted from each node: it stands for so many images.  ``steps``: steps of
+        robots that may be looked at.  Raises `Undecided` after so many steps.
         """
         if len(self._safe) + len(self._spoken) > _KEPT:
             self._forget()
         self._spoken.say(word)
-        #: How often the next steps of a mixture were looked at.
-        self._visited = 0
+        #: How often the next steps of a mixture were looked at, and steps of robots that may be.
+        self._visited, self._steps_left = 0, steps
         random = Random(0)  # always the same ones
         found = self._first_of_nodes(most, random)
         effort = self._visited + _EFFORT * most
@@ -162,6 +164,9 @@ class Mixtures:
         """
         options = self._options_of(ahead[len(chosen)])
         for option in options if random is None else random.sample(options, len(options)):
+            self._steps_left -= 1
+            if self._steps_left < 0:
+                raise Undecided
             label, _, _, said = option
             common = self._spoken.words.common(left, said)
             if common == NOTHING:

@@ -56,9 +56,9 @@ class _Walked:
         kind = CounterexampleWalk if space.robots == 2 else Mixtures
         return cls(part, kind(Choices(part)), images)
 
-    def failing(self, word: Ints, most: int) -> list[Ints]:
+    def failing(self, word: Ints, most: int, steps: int = sys.maxsize) -> list[Ints]:
         """Failing tuples of plans by the word of each state (states), see `Mixtures.failing`."""
-        return self.finder.failing(word[self.space.state], most, len(self.images))
+        return self.finder.failing(word[self.space.state], most, len(self.images), steps)
 
 
 class Languages:
@@ -114,13 +114,18 @@ class Languages:
         return not violated
 
     def agreeing(
-        self, word: Ints, images: Sequence[Ints] | None = None, enough: int = sys.maxsize
+        self,
+        word: Ints,
+        images: Sequence[Ints] | None = None,
+        enough: int = sys.maxsize,
+        steps: int = sys.maxsize,
     ) -> list[Agreeing]:
         """Failing tuples of which some image has one sentence; none if ``word`` is a language.
 
         Tasks are walked only where the pool has none, those that were refuted last first.
 
-        ``word``, ``images`` and ``enough``: see `FailingTuples.agreeing`.
+        ``word``, ``images`` and ``enough``: see `FailingTuples.agreeing`.  Raises `Undecided` after
+        so many ``steps`` of robots.
         """
         known = self.pool.agreeing(word, images, enough)
         for number, walked in enumerate(self._parts):
@@ -128,7 +133,7 @@ class Languages:
                 break
             words = [word[self.pool.images[image]] for image in walked.images]
             different = {own.tobytes(): own for own in words}.values()
-            if any(self._keep(walked, walked.failing(w, _LATER)) for w in different):
+            if any(self._keep(walked, walked.failing(w, _LATER, steps)) for w in different):
                 known = self.pool.agreeing(word, images, enough)
                 assert known, "plans that a walk has found are known"
                 self._parts.insert(0, self._parts.pop(number))

@@ -16,8 +16,11 @@ import numpy as np
 from coordlang.vocabulary.failing_tuples import FailingTuples, Shape, sequences_agree
 from coordlang.vocabulary.job import Assignment, words_of_states
 from coordlang.vocabulary.languages import Languages
+from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints
 
+#: Steps of robots that may be looked at to decide a merge, at first: some seconds.
+_STEPS = 2_000_000
 #: Failing tuples, under one symmetry, that are asked together: some megabytes.
 _TOGETHER = 100_000
 
@@ -28,8 +31,9 @@ def merged(
     """Languages with fewer and fewer words, made from each other by merging words.
 
     Those words are merged that hold the fewest states together.  Tasks are searched after some
-    merges, which are taken back if they fail, and twice as many the next time if not.  Of the last
-    language no two words can be merged.  The best one so far comes after each search.
+    merges, which are taken back if they fail, and twice as many the next time if not.  A merge that
+    takes too long to decide is left for later, and then given twice the work.  Of the last language
+    no two words can be merged.  The best one so far comes after each search.
 
     ``language`` is the one to begin with, ``states`` are those that need words, and
     ``languages`` tells what is wrong with a partition.
@@ -37,11 +41,24 @@ def merged(
     mine, pool = np.array(states), languages.pool
     word = words_of_states(language, pool.states)
     _, word[mine] = np.unique(word[mine], return_inverse=True)
-    closed, merges = forbidden_merges(pool, word, {}), 1
-    while (pair := _next_merge(word[mine], closed)) is not None:
+    closed, left = forbidden_merges(pool, word, {}), False
+    merges, steps = 1, _STEPS
+    while True:
+        pair = _next_merge(word[mine], closed)
+        if pair is None:
+            if not left:
+                return
+            closed, left, steps = forbidden_merges(pool, word, {}), False, 2 * steps
+            continue
         trial, of_trial = _merged_often(word, closed, pair, mine, merges)
         known = {shape: own.shape[2] for shape, own in pool.by_shape.items()}
-        if not languages.agreeing(trial, None, 1):
+        try:
+            holds = not languages.agreeing(trial, None, 1, steps)
+        except Undecided:
+            holds = False
+            if merges == 1:
+                closed[pair] = closed[pair[::-1]] = left = True
+        if holds:
             word, merges = trial, 2 * merges
             closed = of_trial | forbidden_merges(pool, word, {})
         else:
