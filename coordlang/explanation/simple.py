@@ -35,6 +35,8 @@ from planners.system.limits import run_until_stopped
 #: The terms of all formulas, and the variables that these limit.
 Lengths = tuple[int, int]
 
+#: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
+_COMPARISONS = 5_000_000
 #: Conflicts of the solver for one question after which the search gives up.
 _CONFLICTS = 120_000
 #: Places of states in terms up to which formulas are looked for by SAT.
@@ -108,7 +110,7 @@ class _Search:
 
     def _finds(self, terms: int, limits: int | None, budget: Budget) -> bool:
         """Whether there is a language with such formulas, which then is the best."""
-        clauses = without_implied(self._languages.clauses)
+        clauses = without_implied(self._languages.clauses, _COMPARISONS)
         order = most_constrained_first(self._job.states, clauses)
         problem = FormulaProblem(order, self._found.size, self._value, self._sizes, terms, limits)
         with closing(problem):

@@ -8,11 +8,9 @@ failing plans left: it is a language.  Work is counted, never timed.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import chain
 from math import isqrt
 from typing import Generic, TypeVar
 
@@ -22,6 +20,7 @@ from coordlang.vocabulary.sat import (
     Undecided,
     clique,
     most_constrained_first,
+    most_frequent_pairs,
     without_implied,
 )
 from planners.search.sat import SolverName
@@ -159,8 +158,9 @@ class ProblemsBySize(Generic[Requirement]):
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way
 #: to a proof.
 _EASY = 1_000
-#: Pairs of states, those in most clauses, by which symmetric partitions are compared: enough to
-#: tell most apart.
+#: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
+_COMPARISONS = 1_000_000
+#: Pairs of states by which symmetric partitions are compared: enough to tell most apart.
 _COMPARED_PAIRS = 100
 
 
@@ -197,7 +197,7 @@ class Partitions(ProblemsBySize[Clause]):
         return super().find(size, conflicts)
 
     def _started(self, size: int) -> PartitionProblem:
-        clauses = without_implied(self._known)
+        clauses = without_implied(self._known, _COMPARISONS)
         # States that every language tells apart name their words first: no others are symmetric.
         first = clique(pair for clause in clauses if len(clause) == 1 for pair in clause)
         others = most_constrained_first(set(self._states).difference(first), clauses)
@@ -206,7 +206,6 @@ class Partitions(ProblemsBySize[Clause]):
         for clause in clauses:
             problem.separate_one(clause)
         if size in self._hard:
-            often = Counter(chain.from_iterable(self._known))
-            pairs = sorted(often, key=lambda pair: (-often[pair], pair))[:_COMPARED_PAIRS]
+            pairs = most_frequent_pairs(self._known, _COMPARED_PAIRS)
             problem.add_lex_leaders(self._permutations, pairs)
         return problem

@@ -29,6 +29,9 @@ from coordlang.vocabulary.sat import (
 from planners.search.sat import whole
 from planners.system.limits import run_until_stopped
 
+#: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
+_COMPARISONS = 5_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class Repair(Outcome):
@@ -166,7 +169,7 @@ class _Repair:
 
     def _first_fit(self, changed: set[int]) -> dict[int, int]:
         partition = self._apart(changed)
-        clauses = without_implied(self._languages.clauses)
+        clauses = without_implied(self._languages.clauses, _COMPARISONS)
         of_state = defaultdict[int, list[Clause]](list)
         for clause in clauses:
             for state in set(chain(*clause)):
@@ -214,7 +217,7 @@ class _Repair:
 
     def _start(self, size: int) -> PartitionProblem:
         """Partitions with the fewest changes; an anchor for each old word fixes its name."""
-        clauses = without_implied(self._languages.clauses)
+        clauses = without_implied(self._languages.clauses, _COMPARISONS)
         anchors = [-1 - word for word in range(self._old_words)]
         states = [*anchors, *most_constrained_first(self._job.states, clauses)]
         problem = PartitionProblem(states, size)

@@ -7,7 +7,7 @@ A clause with fewer pairs asks for more, and implies every clause that holds its
 from __future__ import annotations
 
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, product, repeat
 from typing import Any
@@ -19,21 +19,32 @@ from planners.joint.tables import Ints
 from planners.search.sat import SolverName, sat_solver, solve_slice
 
 
-def without_implied(clauses: Iterable[Clause]) -> list[Clause]:
+def without_implied(clauses: Iterable[Clause], comparisons: int = sys.maxsize) -> list[Clause]:
     """The clauses that no other one implies (by a subset of its pairs), shortest first.
 
-    ``clauses``: in any order; duplicates are dropped.
+    ``clauses``: in any order; duplicates are dropped.  ``comparisons``: pairs of clauses that are
+    compared; after so many the longer clauses are left as they are.
     """
     kept: list[Clause] = []
+    compared = 0
     # A kept clause stands under one of its pairs: what it implies has that pair as well.
     by_pair: dict[Pair, list[Clause]] = {}
     for clause in sorted(set(clauses), key=lambda c: (len(c), sorted(c))):
-        if any(other <= clause for p in clause for other in by_pair.get(p, ())):
-            continue
+        if compared < comparisons:
+            others = [other for p in clause for other in by_pair.get(p, ())]
+            compared += len(others)
+            if any(other <= clause for other in others):
+                continue
         kept.append(clause)
         rarest = min(sorted(clause), key=lambda p: len(by_pair.get(p, ())))
         by_pair.setdefault(rarest, []).append(clause)
     return kept
+
+
+def most_frequent_pairs(clauses: Iterable[Clause], number: int) -> list[Pair]:
+    """The pairs that most clauses hold, at most ``number``, the most frequent first."""
+    frequency = Counter(chain.from_iterable(clauses))
+    return sorted(frequency, key=lambda p: (-frequency[p], p))[:number]
 
 
 def most_constrained_first(states: Iterable[int], clauses: Iterable[Clause]) -> list[int]:
