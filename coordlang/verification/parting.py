@@ -98,7 +98,7 @@ def label_sequences(space: PlanSpace) -> tuple[Ints, Bools]:
         fails.append(not are_all or any(fails[targets[edge]] for edge in edges))
         own = [node] * space.robots if fails[node] else moves
         numbers.append([known.setdefault(key, len(known)) for key in own])
-    return np.array(numbers, np.int64).reshape(-1, space.robots), np.array(fails, np.bool_)
+    return np.array(numbers).reshape(-1, space.robots), np.array(fails, np.bool_)
 
 
 def _different(*columns: Ints) -> tuple[Ints, Ints]:
