@@ -10,7 +10,6 @@ step less to go, and all else that counts is the same for every goal.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -84,21 +83,40 @@ def label_sequences(space: PlanSpace) -> tuple[Ints, Bools]:
     which no mixture fails have equal numbers iff their sets are equal, and every other node has a
     number of its own.  No mixture fails from a node iff its edges are all combinations of what they
     are for each robot, a label and a set of what follows, and none fails from where they lead.
+    O(edges log edges).
     """
-    numbers, fails = list[list[int]](), list[bool]()
-    labels, targets = space.labels.tolist(), space.targets().tolist()
-    known: dict[int | frozenset[tuple[int, int]], int] = {}
-    for node in range(len(space)):  # from the goals up
-        edges = space.out_edges(node)
-        moves = [
-            frozenset((labels[edge][robot], numbers[targets[edge]][robot]) for edge in edges)
-            for robot in range(space.robots)
-        ]
-        are_all = prod(map(len, moves)) == len(edges)
-        fails.append(not are_all or any(fails[targets[edge]] for edge in edges))
-        own = [node] * space.robots if fails[node] else moves
-        numbers.append([known.setdefault(key, len(known)) for key in own])
-    return np.array(numbers).reshape(-1, space.robots), np.array(fails, np.bool_)
+    numbers = np.zeros((len(space), space.robots), np.int64)
+    fails = np.zeros(len(space), np.bool_)
+    for nodes, below in zip(space.layers[1:], space.edges_by_layer(), strict=True):
+        source, size = below.source - nodes.start, nodes.stop - nodes.start
+        combinations, moves = np.ones(size), []
+        for robot, after in enumerate(numbers[below.target].T):
+            own, _ = _different(source, space.robot_labels(robot, below.edges), after)
+            combinations *= np.bincount(own[:, 0], minlength=size)
+            moves.append(own)
+        failing = combinations != np.bincount(source, minlength=size)
+        failing[source[fails[below.target]]] = True
+        for robot, own in enumerate(moves):
+            alone = len(own) + np.arange(size)
+            numbers[nodes, robot] = np.where(failing, alone, _numbered(own, size))
+        fails[nodes] = failing
+    return numbers, fails
+
+
+def _numbered(rows: Ints, size: int) -> Ints:
+    """Numbers below the number of rows for the sets of rows (owner, ..) of so many owners.
+
+    Equal sets have one number; rows are sorted.
+    """
+    counts = np.bincount(rows[:, 0], minlength=size)
+    first = np.cumsum(counts) - counts
+    number, known = np.zeros(size, np.int64), 0
+    for position in range(int(counts.max(initial=0))):
+        larger = np.flatnonzero(counts > position)
+        sets, found = _different(number[larger], *rows[first[larger] + position, 1:].T)
+        number[larger] = known + found
+        known += len(sets)
+    return number
 
 
 def _different(*columns: Ints) -> tuple[Ints, Ints]:
