@@ -66,8 +66,9 @@ class World(Asked):
         self.statics = {name: sorted(own) for name, own in sorted(statics.items())}
         self.types = defaultdict[str, set[str]](set)
         for name, own in problem.objects.items():
-            for kind in {t for each in own for t in supertypes(domain.types, each)}:
-                self.types[kind].add(name)
+            for each in own:
+                for kind in supertypes(domain.types, each):
+                    self.types[kind].add(name)
         self.points = {name: point for name, point in points.items() if name in problem.objects}
         for linked in self.relations.values():
             by_names = from_names(sorted({*chain(*linked)}), linked) or {}

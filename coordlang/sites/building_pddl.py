@@ -362,6 +362,14 @@ class _Motion:
     groups: frozenset[str]
 
 
+def _driving(building: Building) -> list[_Motion]:
+    """Driving along lanes; each of them once, whatever the graphs that have it."""
+    groups = defaultdict[tuple[str, str], frozenset[str]](frozenset)
+    for lane in building.lanes:
+        groups[lane.start, lane.end] |= lane.groups
+    return [_motion(building.places[a], building.places[b], own) for (a, b), own in groups.items()]
+
+
 def _motion(start: Place, end: Place, groups: frozenset[str] = frozenset()) -> _Motion:
     """Driving along a lane, riding in a lift, or, from a place to itself, staying there."""
     on = {place.level: (place.point, place.point) for place in (start, end)}
@@ -383,14 +391,10 @@ def _excluded(building: Building, clearance: float) -> list[tuple[_Motion, _Moti
 
     What the rules for every pair of robots forbid is left out: sharing a place, and swapping.
     """
-    places = building.places
-    groups = defaultdict[tuple[str, str], frozenset[str]](frozenset)
-    for lane in building.lanes:
-        groups[lane.start, lane.end] |= lane.groups
-    driving = [_motion(places[a], places[b], own) for (a, b), own in groups.items()]
+    driving = _driving(building)
     if not driving or (clearance <= 0 and not any(motion.groups for motion in driving)):
         return []
-    motions = [*driving, *(_motion(place, place) for place in places.values())]
+    motions = [*driving, *(_motion(place, place) for place in building.places.values())]
     near = np.triu(_near(motions, clearance), 1)[: len(driving)]
     pairs = [(motions[first], motions[second]) for first, second in np.argwhere(near).tolist()]
     return [pair for pair in pairs if not _is_ruled_out(*pair) and _clash(*pair, clearance)]

@@ -98,7 +98,6 @@ _LINE_END = re.compile(r"\r\n?|\n")
 #: The comments with which a plan of `coordlang plans`, or of another planner, begins and ends.
 _BEGIN = re.compile(r"\s*;\s*(?:sampled )?plan \d+\b", re.IGNORECASE)
 _END = re.compile(r"\s*;\s*(?:makespan|cost) = \d", re.IGNORECASE)
-_NUMBER = re.compile(r"(\d{1,8})(?:\.\d+)?\s*:")
 _LINE = re.compile(
     r"(?:(?P<step>\d+)(?:\.0+)?\s*:)?\s*(?P<action>\([^()]*\))\s*(?:\[\s*[\d.]+\s*\])?$"
 )
@@ -194,8 +193,7 @@ def only_one_plan(text: str, position: Position) -> None:
     for line, raw in enumerate(_LINE_END.split(text), 1):
         second, action = False, raw.partition(";")[0].strip()
         if action:
-            found = _NUMBER.match(action)  # without a number it is in the step before
-            number = int(found[1]) if found else (numbers or [-1])[-1]
+            number = _step_number(action, numbers)
             second = ended or (numbers[:1] == [number] and number < numbers[-1])
             begun = True
             numbers.append(number)
@@ -209,6 +207,14 @@ def only_one_plan(text: str, position: Position) -> None:
                 position=Position(position.file, line, 1),
                 remedy="Write one plan a file (`coordlang plans --max 1`), or use the JSON form.",
             )
+
+
+def _step_number(action: str, before: Sequence[int]) -> int:
+    """The step of an action; one without a number is in the step before."""
+    found = re.match(r"(\d{1,8})(?:\.\d+)?\s*:", action)
+    if found:
+        return int(found[1])
+    return before[-1] if before else -1
 
 
 def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[Texts, ...]]:
