@@ -96,7 +96,7 @@ class TaskLanguage:
         robots = self.model.robots
         if name not in robots:
             raise UsageError(
-                f"{option}{name}: there is no such robot",
+                f"{option}{echoed(name)}: there is no such robot",
                 remedy=f"The robots are {', '.join(robots)}.",
             )
         return robots.index(name)

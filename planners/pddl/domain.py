@@ -241,6 +241,9 @@ def _parameter_lists(fields: Mapping[str, _Items]) -> tuple[list[_Items], _Items
         listed = fields[":parameters"][0].group("a list of parameters").items
     for at, item in enumerate(listed):
         if is_token(item, ":agent"):
+            if ":agent" in fields:
+                what = "':agent' stands among the :parameters and outside of them"
+                raise item.fail(what, f"Name the agent once. {_AGENT_FORM}")
             return [listed[:at], listed[at + 1 :]], listed[at + 1 :]
     clause = _agent_clause(fields)
     if clause is None:

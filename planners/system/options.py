@@ -15,6 +15,7 @@ import sys
 import types
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import Field, field, fields
+from fractions import Fraction
 from itertools import product
 from numbers import Real
 from os import PathLike, fspath
@@ -271,8 +272,8 @@ def _is_of(kind: Any, value: object) -> bool:
         return _is_collection_of(of, get_args(kind), value)
     if kind is Any or isinstance(value, bool):  # which Python takes for a number
         return kind is Any
-    if of is Real and isinstance(value, int):
-        return abs(value) <= sys.float_info.max
+    if of is Real and isinstance(value, int | Fraction):
+        return -sys.float_info.max <= value <= sys.float_info.max
     return isinstance(value, of)
 
 

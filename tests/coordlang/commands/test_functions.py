@@ -11,6 +11,7 @@ import shlex
 import subprocess
 import sys
 from dataclasses import replace
+from fractions import Fraction
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
@@ -251,7 +252,10 @@ BUILD = [
 USES = [
     ("plan", {}, "expected a SENTENCE or --prefer"),
     *(("plan", p, "") for p in ({"sentence": "w0", "prefer": "shortest"}, {"prefer": "best"})),
-    *(("simulate", {"noise": n}, "--noise: expected float") for n in (10**400, True, "1", [1])),
+    *(
+        ("simulate", {"noise": n}, "--noise: expected float")
+        for n in (10**400, Fraction(10**400), True, "1", [1])
+    ),
     ("explain", {"sentence": "w0"}, "--sentence"),
     ("export", {"sentence": "w0", "to": "sas"}, "--to sas"),
     ("verify", {"robot_type": "robot"}, "Leave out --robot-type"),

@@ -188,6 +188,10 @@ CASES: dict[str, Case] = {
         2, UNTYPED, p(OBJECTS, "r1 r2 a b c", "(:init", "(:init (robot r1) (robot r2)")
     ),
     "two agents": case((31, "d.pddl:5"), d(":agent ?r - robot", ":agent ?r ?q - robot")),
+    "an agent inside the parameters and outside": case(
+        (31, "d.pddl:5:46: ':agent' stands among the :parameters and outside of them"),
+        d(AGENT, ":agent ?q - robot :parameters (:agent ?r - robot ?x ?y - room)"),
+    ),
     "an agent whose type is behind :agent only": case(
         2, with_action("hop :agent ?r - robot :parameters (?y - room ?r) :effect (at ?r ?y)")
     ),
