@@ -191,7 +191,8 @@ def _in_processes(
     """
     spawn = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(count, spawn, _prepare, (Packed(batch), memory))
-    started = executor._processes  # before Python 3.14 nothing public knows or ends them
+    # Nothing public ends them before Python 3.14, and after `shutdown` the executor knows none.
+    started = executor._processes
     try:
         with _spawning():
             futures = [executor.submit(_do, job) for job in jobs]
@@ -272,8 +273,10 @@ def _prepare(work: Packed, memory: int | None) -> None:
 def _do(job: Any) -> Outcome:
     try:
         return _attempt(job)
-    except SystemExit:  # all has been cleaned up; the executor would send it as a result
-        os._exit(_ASKED_TO_END)
+    except SystemExit as ended:
+        if ended.code != _ASKED_TO_END:
+            raise
+        os._exit(_ASKED_TO_END)  # all has been cleaned up; the executor would send it as a result
 
 
 def _asked_to_end(_signal: int, _frame: FrameType | None) -> None:

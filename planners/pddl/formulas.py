@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import count
+from itertools import chain, count
 
 from planners.pddl.lifted import (
     TRUE,
@@ -141,11 +141,19 @@ def _without_shadows(names: Names, item: Group) -> Group:
     """A ``forall`` in which a variable that would shadow an outer one has a name of its own."""
     for name in [variable.name for variable in names.read_variables(item.items[1])]:
         if name in names.variables:
-            taken = item.source.text.lower(), names.variables
+            taken = {*names.variables, *_texts(item)}
             fresh = (f"{name}.{n}" for n in count(1))
-            new = next(each for each in fresh if not any(each in place for place in taken))
+            new = next(each for each in fresh if each not in taken)
             item = _renamed(item, name, new).group("an effect in parentheses")
     return item
+
+
+def _texts(item: Expression) -> Iterator[str]:
+    """The tokens of a part of a file."""
+    if isinstance(item, Group):
+        yield from chain.from_iterable(map(_texts, item.items))
+    else:
+        yield item.text
 
 
 def _cost(
