@@ -94,7 +94,7 @@ def _points(
         if found.stopped is not None:
             raise found.stopped
         start = found.partition
-        mean, worst = map(float, failures)
+        mean, worst = float(failures.mean), float(failures.worst)
         is_best = bool(found.figures["least_of_all_partitions"])
         yield _point(candidates, spaces, start, words, mean, worst, is_best=is_best)
         if not worst:

@@ -146,7 +146,7 @@ def _few_words(making: Making, words: int, *, worst: bool, seed: int) -> Built:
     making.note("coordination")
     outcome, failures = few_words(job, words, worst=worst)
     making.note("vocabulary")
-    if not any(failures):
+    if not failures.worst:
         with little_time_after(outcome.stopped):
             making.check(outcome.partition)
         if not isinstance(outcome.stopped, KeyboardInterrupt):

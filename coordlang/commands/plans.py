@@ -28,6 +28,7 @@ class OptimalPlans(Presented):
     robot, None where it idles.
     """
 
+    __slots__ = ("_plans",)
     shown: ClassVar[tuple[str, ...]] = ("count", "makespan", "robots")
 
     def __init__(self, plans: Plans) -> None:

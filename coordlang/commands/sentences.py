@@ -91,6 +91,7 @@ def show_say(found: Said, options: SayOptions) -> int:
 class SentencePlans(OptimalPlans, InTask):
     """The optimal plans that a sentence leaves open, as `OptimalPlans` with a DAG."""
 
+    __slots__ = ("_words", "used")
     shown = ("sentence", *OptimalPlans.shown, "covered")
 
     def __init__(self, used: TaskLanguage, words: Sequence[int]) -> None:

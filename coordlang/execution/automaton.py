@@ -94,9 +94,10 @@ def determinise(
     in.  It is then the least automaton with this output (a Moore machine: states are merged that
     agree on the knowledge, now and after every continuation).
 
-    Subset construction from the start down, then equal futures are one, upwards.  There may be
-    exponentially many subsets: raises `OutOfMemory` where they fill the memory or have more than
-    ``most`` members.
+    Three passes over the layers: nodes that behave alike are one (upwards), subset construction
+    (downwards), equal futures are one (upwards).  Linear but for the subsets, of which there may be
+    exponentially many: raises `OutOfMemory` where they fill the memory or have more than ``most``
+    members.
     """
     layers: list[_Layer] = []
 
@@ -131,14 +132,15 @@ def _subsets(
     """The layers, the start first."""
     true = [0] * len(space) if truth is None else truth
     labels, targets = space.robot_labels(robot).tolist(), space.targets().tolist()
-    subsets: dict[_Nodes, None] = {(int(space.starts[0]),): None}
+    alike = _alike(space, true, labels, targets)  # no set of own continuations is another one then
+    subsets: dict[_Nodes, None] = {(alike[int(space.starts[0])],): None}
     members = 0
     while subsets:
         layer: _Layer = {}
         for subset in subsets:
             after: dict[int, set[int]] = defaultdict(set)
             for edge in chain.from_iterable(map(space.out_edges, subset)):
-                after[labels[edge]].add(targets[edge])
+                after[labels[edge]].add(alike[targets[edge]])
             facts = [true[node] for node in subset]
             moves = {own: tuple(sorted(nodes)) for own, nodes in sorted(after.items())}
             layer[subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
@@ -149,6 +151,18 @@ def _subsets(
         yield layer
         every = (moves.values() for _, moves in layer.values())
         subsets = dict.fromkeys(chain.from_iterable(every))
+
+
+def _alike(
+    space: PlanSpace, true: Sequence[int], labels: Sequence[int], targets: Sequence[int]
+) -> list[int]:
+    """For each node the first that knows the same, with the same labels to such nodes."""
+    first: dict[object, int] = {}
+    alike: list[int] = []
+    for node, layer in enumerate(space.layer.tolist()):
+        moves = frozenset((labels[edge], alike[targets[edge]]) for edge in space.out_edges(node))
+        alike.append(first.setdefault((layer, true[node], moves), node))
+    return alike
 
 
 def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:

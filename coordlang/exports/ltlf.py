@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from coordlang.execution.task_language import InTask, TaskLanguage
@@ -34,7 +34,7 @@ class ExportedFormula(InTask):
     ``symbols``: symbol -> PDDL atom.
     """
 
-    used: TaskLanguage
+    used: TaskLanguage = field(compare=False)
     formula: str
     over_words: str
     words: dict[str, str]

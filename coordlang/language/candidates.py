@@ -264,11 +264,13 @@ def _one_by_one(
 ) -> Candidates:
     """Each task searched by itself; those without a plan are left out if they may be, but one."""
     kept: list[ListedTask] = []
+    plans: dict[Goal, list[PlanSpace]] = {}
     spaces: list[PlanSpace] = []
     skipped: list[str] = []
     for number, (text, task) in enumerate(zip(listed, tasks, strict=True)):
         try:
-            spaces.append(search(loaded.model, task))
+            shared = plans if kind == "file" else {}
+            spaces.append(_search_once(loaded.model, task, shared))
             kept.append(text)
         except ProvedImpossible as error:
             if skip_unsolvable and len(skipped) < len(tasks) - 1:
@@ -279,6 +281,25 @@ def _one_by_one(
                 raise
     source = Searched(as_executed(joined(spaces)))
     return Candidates(kind, loaded, source, listed=tuple(kept), skipped=tuple(skipped))
+
+
+def _search_once(
+    model: JointModel, task: PlanningTask, found: dict[Goal, list[PlanSpace]]
+) -> PlanSpace:
+    """The plan space of a task: part of one that was found before, if it starts on plans there.
+
+    From a state on an optimal plan the plan space holds all optimal plans to that goal; with slack,
+    plans of another task may have used some of it.
+    """
+    if model.slack:
+        return search(model, task)
+    for space in found.setdefault(task.goal, []):
+        state = int(find_rows(space.rows, task.init[None, :])[0])
+        for node in np.flatnonzero(space.state == state)[:1].tolist():
+            cost = int(space.cost[space.first_path(node)].sum())
+            return space.with_tasks(np.array([node]), np.array([cost]))
+    found[task.goal].append(search(model, task))
+    return found[task.goal][-1]
 
 
 def _texts(task: ListedTask) -> tuple[str, str]:

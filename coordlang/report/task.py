@@ -53,7 +53,7 @@ EDGES = 4_000
 #: Sentences listed for one task.
 SENTENCES = 60
 #: Members of the subsets with which one robot's own subplans are counted; beyond, they are not.
-_SUBSETS = 1_000_000
+_SUBSETS = 200_000
 #: Additions beyond which it is not counted how often robots fail in a task.
 _ADDITIONS = 300_000
 #: Plan-space edges beyond which a task is not verified again for the page.
@@ -271,7 +271,7 @@ def _failure(language: TaskLanguage, word: Ints | None) -> float | None:
     ``word`` has the word number of each node; None: without a word.
     """
     with suppress(TooManyToCount):
-        return float(failure_probability([language.space], [word], _ADDITIONS)[0])
+        return float(failure_probability([language.space], [word], _ADDITIONS).mean)
     return None
 
 

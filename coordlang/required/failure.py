@@ -28,7 +28,7 @@ from itertools import accumulate
 from math import gcd, prod
 from random import Random
 from statistics import mean
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -115,10 +115,17 @@ class TooManyToCount(OutOfMemory):
     """A failure probability that would take more work than it is allowed."""
 
 
+class FailureProbability(NamedTuple):
+    """How often robots miscoordinate, exactly: in a task drawn uniformly, and in the worst one."""
+
+    mean: Fraction
+    worst: Fraction
+
+
 def failure_probability(
     spaces: Iterable[PlanSpace], words: Iterable[Ints | None], most: int = MOST
-) -> tuple[Fraction, Fraction]:
-    """Count how often robots miscoordinate: in a task drawn uniformly, and in the worst one.
+) -> FailureProbability:
+    """Count how often robots miscoordinate in all tasks of some plan spaces.
 
     ``words`` are for each of the ``spaces`` the word number of each node; None: silence.  Raises
     `TooManyToCount` beyond ``most`` additions.
@@ -127,7 +134,7 @@ def failure_probability(
     found: list[Fraction] = []
     for space, word in zip(spaces, words, strict=True):
         found += FailureCount(space, word, sets, most).tasks()
-    return mean(found), max(found)
+    return FailureProbability(mean(found), max(found))
 
 
 def failure_of_sentence(

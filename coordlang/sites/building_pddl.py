@@ -14,7 +14,7 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 
-from coordlang.sites.building import Building, Place, pddl_name
+from coordlang.sites.building import Building, Lane, Place, pddl_name
 from coordlang.sites.coordinates import Segment, checked, distance
 from planners.joint.tables import Bools
 from planners.system.errors import BadInput, Position, UsageError, note
@@ -210,8 +210,10 @@ def _facts(building: Building, team: Mapping[str, Robot], *, with_graphs: bool) 
 
 def _lanes(building: Building, *, with_graphs: bool) -> Iterator[str]:
     """The lanes out of each place, each once, and the graphs that have them."""
-    for place in building.places:
-        out = [lane for lane in building.lanes if lane.start == place]
+    leaving: dict[str, list[Lane]] = {name: [] for name in building.places}
+    for lane in building.lanes:
+        leaving[lane.start].append(lane)
+    for out in leaving.values():
         yield from _wrapped([*dict.fromkeys(f"(lane {lane.start} {lane.end})" for lane in out)])
         if with_graphs:
             yield from _wrapped([f"(on-graph {n.start} {n.end} {_graph(n.graph)})" for n in out])

@@ -14,7 +14,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from coordlang.required.failure import TooManyToCount, failure_probability
+from coordlang.required.failure import FailureProbability, TooManyToCount, failure_probability
 from coordlang.required.plan_table import PlanTable
 from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.exhaustive import partitions
@@ -41,7 +41,7 @@ def few_words(
     worst: bool = False,
     start: Assignment | None = None,
     work: int = WORK,
-) -> tuple[Outcome, tuple[Fraction, Fraction]]:
+) -> tuple[Outcome, FailureProbability]:
     """Find the partition into at most ``words`` words under which robots fail least.
 
     Anytime: when a limit comes, the best partition so far is returned.
@@ -83,11 +83,11 @@ class _Search(LocalSearch):
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
         figures = {
-            "silence_mean": float(self._silence[0]),
-            "silence_worst": float(self._silence[1]),
+            "silence_mean": float(self._silence.mean),
+            "silence_worst": float(self._silence.worst),
             "partitions_measured": self._measured,
             "partitions_recounted": self._counted,
-            "least_of_all_partitions": self._is_best or not any(self.failures),
+            "least_of_all_partitions": self._is_best or not self.failures.worst,
         }
         partition = self._job.partition(self.best_word)
         return Outcome(partition, self._job.lower_bound, figures, stopped)
@@ -101,7 +101,7 @@ class _Search(LocalSearch):
             return
         language = self._coarsest_language()
         if language is not None and word_count(language) <= self._words:
-            self._take(job.word(language), (Fraction(0), Fraction(0)))
+            self._take(job.word(language), FailureProbability(Fraction(0), Fraction(0)))
             return
         spaces, states = job.candidates.spaces, len(job.candidates.rows)
         self.table = PlanTable(spaces, states, job.seed, mixtures=True)
@@ -164,19 +164,19 @@ class _Search(LocalSearch):
             if self._order(found) < self._order(self.failures):
                 self._take(word, found)
             self._candidate = None  # not before: counting may be stopped
-        return not any(self.failures)
+        return not self.failures.worst
 
-    def _count(self, word: Ints) -> tuple[Fraction, Fraction]:
+    def _count(self, word: Ints) -> FailureProbability:
         self._counted += 1
         return failure_probability(self._job.candidates.spaces, self._job.of_nodes(word))
 
-    def _take(self, word: Ints, failures: tuple[Fraction, Fraction]) -> None:
+    def _take(self, word: Ints, failures: FailureProbability) -> None:
         self.best_word, self.failures = word, failures
         self.best = float(self._order(failures)[0])
 
-    def _order(self, found: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
+    def _order(self, found: FailureProbability) -> tuple[Fraction, Fraction]:
         """What is minimised: the mean, then the worst task; or the other way round."""
-        return found[::-1] if self._worst else found
+        return (found.worst, found.mean) if self._worst else found
 
 
 def partition_count(states: int, words: int) -> int:

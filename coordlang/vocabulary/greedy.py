@@ -62,7 +62,7 @@ def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -
     States are tried in the given order, which decides the number of words: the result
     is a language, not a smallest one (the paper, Algorithm 1).
 
-    O(words * (states + constraints)).
+    O(words * (states + what the constraints of each state hold)).
     """
     clashes = defaultdict[int, set[int]](set)
     for a, b in clashing(constraints):

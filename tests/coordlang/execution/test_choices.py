@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import accumulate, pairwise, product
 from random import Random
 
 import pytest
@@ -276,3 +276,18 @@ def test_least_automaton_of_any_graph() -> None:
         assert len(automaton) == least
         merged += len(subsets) > least
     assert merged >= 30
+
+
+def test_nodes_that_behave_alike_are_one_in_subsets() -> None:
+    """By each label there are two ways on, to nodes of which all have both labels."""
+    random, width, steps = Random(1), 300, 10
+    sizes = [1, *([width] * steps), 1]
+    starts = [0, *accumulate(sizes)]
+    edges: list[list[tuple[int, int]]] = [[]]
+    for layer, size in enumerate(sizes[1:]):
+        below = range(starts[layer], starts[layer + 1])
+        for _ in range(size):
+            ways = [sorted(random.sample(below, min(2, len(below)))) for _ in range(2)]
+            edges.append([(label, to) for label, own in enumerate(ways) for to in own])
+    automaton = determinise(layered_space(sizes, edges), 0, most=sum(sizes))
+    assert (len(automaton), automaton.count) == (steps + 2, 2 ** (steps + 1))

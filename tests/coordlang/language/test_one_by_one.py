@@ -60,8 +60,10 @@ def some_tasks(model: JointModel, start: np.ndarray, most: int) -> list[ListedTa
 
 
 @pytest.mark.parametrize("kind", ["agent", "plain"])
-def test_random_tasks_have_the_same_plans(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    compared = skipped = 0
+def test_random_tasks_have_the_same_plans(
+    kind: str, monkeypatch: pytest.MonkeyPatch, searches: list[str]
+) -> None:
+    compared = shared = skipped = 0
     for seed in range(8):
         text = random_model(seed, kind)  # type: ignore[arg-type]
         domain = parse_domain(Source("d", text.domain))
@@ -83,6 +85,7 @@ def test_random_tasks_have_the_same_plans(kind: str, monkeypatch: pytest.MonkeyP
                 if sum(sum(counts(space)) for space in explored.spaces) > 2000:
                     continue  # plans are listed one by one
                 patched.setattr(room, "MOST_STATES", 0)
+                before = len(searches)
                 single = from_listed(domain, [problem], listed, options, skip_unsolvable=True)
             assert (explored.states is None, single.states) == (False, None)
             assert answers(single) == answers(explored)
@@ -90,16 +93,18 @@ def test_random_tasks_have_the_same_plans(kind: str, monkeypatch: pytest.MonkeyP
             assert single.skipped == explored.skipped
             assert single.listed == explored.listed
             compared += single.count
+            shared += single.count + len(single.skipped) - (len(searches) - before)
             skipped += len(single.skipped)
-    assert min(compared, skipped) > 10
+    assert min(compared, shared, skipped) > 10
 
 
-def test_starts_elsewhere_are_noted(large: None) -> None:
+def test_tasks_on_one_plan_share_its_search(large: None, searches: list[str]) -> None:
     domain, problem = read("grid", "gw4-3x3")
     cells = ["c0-0", "c0-1", "c0-2", "c1-2"]
     tasks = [ListedTask((f"(at r1 {c})", "(at r2 c2-0)"), ("(at r1 c2-2)",)) for c in cells]
     with pytest.warns(Note, match="4 of 4 tasks start elsewhere .* is not checked"):
         found = from_listed(domain, [problem], tasks)
+    assert searches == ["1"]
     costs = [found.spaces[0].cost_of(task)[0] for task in range(4)]
     assert costs == [4, 3, 2, 1]
     assert [goal_text(found.model, goal) for goal in found.spaces[0].goals] == ["(at r1 c2-2)"] * 4
