@@ -527,8 +527,8 @@ def _others(record: Mapping[str, Any], where: str) -> dict[str, list[dict[str, i
         for event in _get(others, robot, list, f"{where}: 'others'"):
             if not isinstance(event, Mapping):
                 raise _broken(f"{where}: an event of {_shown(robot)} is {_shown(event)}")
-            for kinds in ((), (int,)):
-                _check_inside(event, kinds, f"{where}: 'others'")
+            _check_inside(event, (), f"{where}: 'others'")
+            _check_inside(event, (int,), f"{where}: 'others'")
     return others
 
 
@@ -623,6 +623,7 @@ def _nested(record: Any, key: str, where: str, *kinds: type[Any]) -> Any:
 
 
 def _check_inside(value: Iterable[Any], kinds: Sequence[type[Any]], where: str) -> None:
+    """Check what is behind the keys: values of these kinds inside one another, or the keys."""
     for key in value:
         if not kinds:
             _check_plain(key, where)

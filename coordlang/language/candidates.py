@@ -262,7 +262,10 @@ def _one_by_one(
     position: Position | None,
     skip_unsolvable: bool = False,
 ) -> Candidates:
-    """Each task searched by itself; those without a plan are left out if they may be, but one."""
+    """Each task searched by itself; those without a plan are left out if they may be, but one.
+
+    Tasks of a file with one goal share what is found.
+    """
     kept: list[ListedTask] = []
     plans: dict[Goal, list[PlanSpace]] = {}
     spaces: list[PlanSpace] = []
