@@ -121,8 +121,8 @@ class ExportedTask(InTask):
 
         Raises `UsageError` if it cannot be written to.
         """
-        texts = {"domain.pddl": self.domain, "problem.pddl": self.problem}
-        write_texts(fspath(folder), texts)
+        written = {"domain.pddl": self.domain, "problem.pddl": self.problem}
+        write_texts(fspath(folder), written)
 
     def translate_plan(self, actions: Sequence[str]) -> tuple[Texts, ...]:
         """Translate a plan of the exported problem, the names of its actions, into joint steps.

@@ -422,11 +422,7 @@ class _Game:
         first = self._drawn(start, None, random)
         said = sentence(self._word[node] for node in self.space.nodes_on(start, first))
         plans = [self._drawn(start, said, random) for _ in range(self.space.robots)]
-        steps = [
-            tuple(self.space.labels_of(edge)[robot] for robot, edge in enumerate(step))
-            for step in zip(*plans, strict=True)
-        ]
-        return self.space.path_with(start, steps) is None
+        return self.space.mixture_fails(start, plans)
 
     def _drawn(self, node: int, said: Sentence | None, random: Random) -> list[int]:
         """The edges of a plan drawn uniformly, of those with a sentence (None: of all)."""

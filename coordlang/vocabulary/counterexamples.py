@@ -209,18 +209,10 @@ class Mixtures:
         for one in sorted(set(plans), key=lambda plan: (plans.count(plan), plan)):
             for other in sorted(set(plans) - {one}, key=lambda plan: (-plans.count(plan), plan)):
                 fewer = tuple(other if plan == one else plan for plan in plans)
-                if self._fails(node, fewer):
+                if self._space.mixture_fails(node, fewer):
                     plans = fewer
                     break
         return plans
-
-    def _fails(self, node: int, plans: _Plans) -> bool:
-        """Whether the mixture of each robot's part of its plan fails."""
-        steps = [
-            [self._space.labels_of(edge)[robot] for robot, edge in enumerate(edges)]
-            for edges in zip(*plans, strict=True)
-        ]
-        return self._space.path_with(node, steps) is None
 
     def _others(self, node: int, most: int, random: Random) -> set[_Plans]:
         """More plans of mixtures from a node of which one fails, in ``most`` draws at most."""

@@ -155,6 +155,17 @@ class PlanSpace:
             node = int(self.target[edge])
         return path
 
+    def mixture_fails(self, node: int, paths: Sequence[Sequence[int]]) -> bool:
+        """Whether no path from a node has the labels of each robot in its own one of these paths.
+
+        ``paths`` are edges, of equal numbers.
+        """
+        steps = [
+            [self.labels_of(edge)[robot] for robot, edge in enumerate(edges)]
+            for edges in zip(*paths, strict=True)
+        ]
+        return self.path_with(node, steps) is None
+
     def path_of_robots(
         self, node: int, robots: Sequence[int], steps: Sequence[Sequence[int]]
     ) -> list[int] | None:
