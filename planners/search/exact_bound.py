@@ -208,7 +208,7 @@ class ExactQuestion:
         plans = self._plans
         while True:
             if not self._begins:
-                self._begins = self._formula.lengthen(plans)
+                self._begins = self._formula.lengthen(plans, at_least)
             asked = plans.steps >= at_least
             if asked and plans.holds([self._begins]):
                 plans.require([self._begins])

@@ -9,27 +9,21 @@ only where an effect changes it.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Sequence
 from itertools import accumulate, combinations
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
-from planners.joint.tables import Bools, Ints, Rows, unique_rows
+from planners.joint.tables import Bools, Ints, unique_rows
 from planners.pddl.formula_tree import conjuncts, negated, signed, substituted
 from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Or, StepAtom, Truth
-from planners.search.goals import FactsOf
-from planners.search.graphs import csgraph
+from planners.search.mutexes import after_start, before_goal, pairs
 from planners.search.questions import FixedPlans, Literals
 from planners.search.sat import flat_clauses
 from planners.search.state_variables import StateVariable, state_variables
-from planners.system.errors import OutOfMemory
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 
 class PlanFormula:
@@ -52,6 +46,9 @@ class PlanFormula:
         self._makers: dict[tuple[int, bool], Literals] = defaultdict(list)
         #: Per robot and some of its labels, as bytes, the variable that they imply.
         self._implied: dict[tuple[int, bytes], int] = {}
+        #: What facts exclude each other soon after the start, and shortly before the goal.
+        self._soon = after_start(model, task.init)
+        self._late = before_goal(model, task.goal, self._soon[-1])
         variables = state_variables(model, task.init)
         for variable in variables:
             self._exactly_one([fact + 1 for fact in variable.facts])
@@ -62,7 +59,7 @@ class PlanFormula:
                     self._action(robot, label, action)
         for i, j in combinations(range(len(model.robots)), 2):
             self._apart(i, j)
-        self._never_together(variables, task.init)
+        self._never_together(variables)
         goal = self._goal_clauses(task.goal)
         begins = self._fresh()
         begin = self._just(set(model.codec.true_facts(task.init)))
@@ -74,17 +71,26 @@ class PlanFormula:
         """The plans of no step, that is, the goal, as a formula to be closed."""
         return FixedPlans(self._goal, [len(own) for own in self._model.labels])
 
-    def lengthen(self, plans: FixedPlans) -> int:
+    def lengthen(self, plans: FixedPlans, at_least: int) -> int:
         """Add a step before the others; the literal that says that the task begins there.
 
-        What a solver has learned of the way to the goal stays true of longer plans.
+        What a solver has learned of the way to the goal stays true of longer plans.  What follows
+        for states soon after the start is said of plans of ``at_least`` so many steps.
         """
-        before = self.size * (plans.steps + 1)
+        steps, never = plans.steps + 1, self._soon[-1]
+        before = self.size * steps
         number = np.abs(self._flat_step)
         number[number > self.size] -= 2 * self.size
-        step = np.sign(self._flat_step) * (number + before)
-        plans.put_before(step, before + np.array(self._first_label))
-        return before + self.size
+        clauses = [np.sign(self._flat_step) * (number + before)]
+        clauses += [_apart(own, never, before) for own in self._late[:-1][steps : steps + 1]]
+        begins = before + self.size
+        if steps >= at_least:
+            clauses += [
+                _apart(own, never, self.size * (steps - depth), begins)
+                for depth, own in enumerate(self._soon[1:-1][:steps], 1)
+            ]
+        plans.put_before(np.concatenate(clauses), before + np.array(self._first_label))
+        return begins
 
     def _fresh(self) -> int:
         self.size += 1
@@ -185,10 +191,11 @@ class PlanFormula:
             ]
         return self._implied[key]
 
-    def _never_together(self, variables: Sequence[StateVariable], init: Rows) -> None:
+    def _never_together(self, variables: Sequence[StateVariable]) -> None:
         """Pairs of facts that exclude each other, of different variables."""
         known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
-        for one, other in mutexes(self._model, init):
+        never = self._soon[-1]
+        for one, other in pairs(never, np.zeros_like(never)).tolist():
             if one == other:
                 self.step.append((-(one + 1),))
             elif one not in known or known[one] != known.get(other):
@@ -214,99 +221,19 @@ class PlanFormula:
         return [fact if fact - 1 in true else -fact for fact in facts]
 
 
+def _apart(excluded: Bools, never: Bools, before: int, where: int = 0) -> Ints:
+    """Clauses that exclude pairs of facts in a state, whose variables come after ``before``.
+
+    Only those that are not ``never`` true together; only ``where`` a literal holds.
+    """
+    found = pairs(excluded, never)
+    clauses = np.zeros((len(found), 4), np.int64)
+    clauses[:, 0] = -where
+    clauses[:, 1:3] = -(found + 1 + before)
+    return clauses[:, 0 if where else 1 :].reshape(-1)
+
+
 def _unique(table: Bools) -> tuple[Bools, Ints]:
     """The different rows of a table, sorted, and each row's number among them."""
     found, number = unique_rows(np.packbits(table, axis=1))
     return np.unpackbits(found, axis=1, count=table.shape[1]).astype(np.bool_), number
-
-
-#: Ways to make facts true, beyond which nothing is looked for.
-_MOST = 8_000
-#: Ways that are compared with all others at a time.
-_BLOCK = 512
-
-
-def mutexes(model: JointModel, init: Rows, block: int = _BLOCK) -> list[tuple[int, int]]:
-    """Pairs (p, q), p < q, of which no state that is reachable from ``init`` has both; sorted.
-
-    (p, p) where fact p is never true; such facts are in no other pair.  The joint steps must be
-    composed.  None are found where labels make facts true in more than `_MOST` ways, or where the
-    memory has no room for scipy; ``block`` ways are compared with the others at a time.
-    """
-    try:
-        csgraph()  # scipy is loaded only where it fits
-    except OutOfMemory:
-        return []
-    facts, ways = len(model.codec.facts), list(_ways(model))
-    if len(ways) > _MOST or not facts:
-        return []
-    true = model.codec.true_facts(model.codec.facts_part(init))
-    may = np.zeros((facts, facts), np.bool_)
-    may[np.ix_(true, true)] = True
-    # The ways of labels, then those of facts that stay true.
-    staying = [frozenset((fact,)) for fact in range(facts)]
-    needs = _table([*(way.needs for way in ways), *staying], facts)
-    adds = _table([*(way.adds for way in ways), *staying], facts)
-    together = _together(model, ways)
-    before = -1
-    while (count := int(may.sum())) != before:  # pairs that may be true are added
-        before = count
-        #: (ways, facts): how often one of what a way needs excludes the fact.
-        excluded = needs @ (~may).astype(np.float32)
-        excludes = np.ascontiguousarray(excluded.T)
-        possible = needs.multiply(excluded).sum(axis=1) == 0
-        ready = np.flatnonzero(possible[: len(ways)])
-        for start in range(0, len(ready), block):
-            some = ready[start : start + block]
-            both = together[some] & (needs[some] @ excludes == 0) & possible
-            # Of tables that are dense, those by way are multiplied without a copy.
-            added = adds.T @ np.ascontiguousarray(both.T, np.float32)
-            found = added @ adds[some] > 0
-            may |= found | found.T
-    never = ~may.diagonal()
-    apart = np.triu(~may, 1) & ~never[:, None] & ~never
-    np.fill_diagonal(apart, never)
-    return [(int(p), int(q)) for p, q in np.argwhere(apart)]
-
-
-class _Way(NamedTuple):
-    """How a robot's label makes facts true, and what it deletes in any case."""
-
-    robot: int
-    label: int
-    needs: frozenset[int]
-    adds: frozenset[int]
-    deletes: frozenset[int]
-
-
-def _ways(model: JointModel) -> Iterator[_Way]:
-    """Labels' effects under one condition each."""
-    assert isinstance(model.stepper, ComposingStepper)
-    for robot, own in enumerate(model.stepper.labelled):
-        for label, action in enumerate(own):
-            if action is not None:
-                read = FactsOf.of(model, action)
-                for needs, adds in read.ways():
-                    yield _Way(robot, label, needs, adds, read.deletes)
-
-
-def _together(model: JointModel, ways: Sequence[_Way]) -> Bools:
-    """Which ways may share a step: (ways of labels, all ways)."""
-    assert isinstance(model.stepper, ComposingStepper)
-    robot, label = (np.array([way[k] for way in ways], np.int64) for k in range(2))
-    fits = (robot[:, None] == robot) & (label[:, None] == label)
-    for (i, j), table in model.stepper.tables.items():
-        mine, theirs = np.flatnonzero(robot == i), np.flatnonzero(robot == j)
-        fits[np.ix_(mine, theirs)] = table[np.ix_(label[mine], label[theirs])]
-    deletes = _table([way.deletes for way in ways], len(model.codec.facts))
-    return np.hstack((fits | fits.T, deletes.toarray() == 0))
-
-
-def _table(sets: Sequence[frozenset[int]], width: int) -> csr_array:
-    """Sets as the rows of a table of 0 and 1."""
-    from scipy.sparse import csr_array
-
-    first = np.cumsum([0, *map(len, sets)])
-    entries = np.array([entry for own in sets for entry in sorted(own)], np.int64)
-    ones = np.ones(len(entries), np.float32)
-    return csr_array((ones, entries, first), shape=(len(sets), width))

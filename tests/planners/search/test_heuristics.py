@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from coordlang.commands.inspect import feasibility
-from planners.joint.tables import Ints
+from planners.joint.tables import Bools, Ints
 from planners.loading import PlanningInstance
 from planners.search.goals import FAR
 from planners.search.heuristics import HEURISTICS, Bound, heuristic
+from planners.search.mutexes import after_start, before_goal, pairs
 from planners.search.optimal_plans import search
-from planners.search.plan_formula import mutexes
 from planners.search.reachable import Space, explore
 from planners.search.search_estimate import estimate
 from planners.search.state_variables import StateVariable, state_variables
@@ -30,7 +30,7 @@ from tests.support.texts import model_of
 def check(bound: Bound, loaded: PlanningInstance, space: Space) -> Counter[int]:
     """How far below the true distance the bounds are; -1: it is said that there is no way."""
     model, task = loaded.model, loaded.tasks[0]
-    true = distances(space, model.holds(task.goal, space.rows).tolist())
+    true = distances(space, model.holds(task.goal, space.rows))
     least = heuristic(bound, model, task.goal, task.init)(space.rows)
     assert (least[true >= 0] <= true[true >= 0]).all()
     assert ((least == 0) == (true == 0)).all()
@@ -39,13 +39,13 @@ def check(bound: Bound, loaded: PlanningInstance, space: Space) -> Counter[int]:
     return gaps + Counter({-1: int((least >= FAR).sum())})
 
 
-def distances(space: Space, goals: list[bool]) -> Ints:
-    """The least joint steps from every state to a goal, -1 if there is no way, backward."""
-    edges = zip(space.target.tolist(), space.sources.tolist(), strict=True)
-    back: nx.DiGraph[int] = nx.DiGraph(edges)
-    back.add_nodes_from(range(len(space)))
-    ends = {state for state, reached in enumerate(goals) if reached}
-    found = nx.multi_source_dijkstra_path_length(back, ends) if ends else {}
+def distances(space: Space, ends: Bools, *, forward: bool = False) -> Ints:
+    """The least joint steps from every state to one of the ends, or from it, -1: there is no way."""
+    edges = (space.sources, space.target) if forward else (space.target, space.sources)
+    graph = nx.DiGraph(zip(*(own.tolist() for own in edges), strict=True))
+    graph.add_nodes_from(range(len(space)))
+    reached = set(np.flatnonzero(ends).tolist())
+    found = nx.multi_source_dijkstra_path_length(graph, reached) if reached else {}
     return np.array([found.get(state, -1) for state in range(len(space))])
 
 
@@ -58,13 +58,23 @@ def variables_of(loaded: PlanningInstance, space: Space) -> list[StateVariable]:
     return variables
 
 
-def mutexes_of(loaded: PlanningInstance, space: Space) -> list[tuple[int, int]]:
-    """Pairs of facts that are true together in no reachable state."""
-    truth = loaded.model.codec.truth(space.rows)
-    found = mutexes(loaded.model, loaded.tasks[0].init)
-    assert not any((truth[:, p] & truth[:, q]).any() for p, q in found)
-    assert mutexes(loaded.model, loaded.tasks[0].init, block=1) == found
-    return found
+def exclusions(loaded: PlanningInstance, space: Space) -> tuple[list[list[int]], int, int]:
+    """Pairs of facts that no state has; how many more are excluded near the start and the goal."""
+    model, task = loaded.model, loaded.tasks[0]
+    soon = after_start(model, task.init)
+    late = before_goal(model, task.goal, soon[-1])
+    assert all(map(np.array_equal, soon, after_start(model, task.init, block=1)))
+    assert all(map(np.array_equal, late, before_goal(model, task.goal, soon[-1], block=1)))
+    begins = (space.rows == task.init).all(axis=1)
+    truth, goals = model.codec.truth(space.rows), model.holds(task.goal, space.rows)
+    both = (soon, distances(space, begins, forward=True)), (late, distances(space, goals))
+    for tables, far in both:
+        for steps, table in enumerate(tables):
+            last = len(space) if steps == len(tables) - 1 else steps
+            near = truth[(far >= 0) & (far <= last)].astype(int)
+            assert not (near.T @ near)[table].any(), "excluded facts are both true"
+    known = pairs(soon[-1], np.zeros_like(soon[-1]))
+    return known.tolist(), *(len(pairs(own[0], soon[-1])) for own in (soon, late))
 
 
 def test_random_models() -> None:
@@ -80,13 +90,16 @@ def test_random_models() -> None:
         variables = variables_of(loaded, space)
         seen["with variables" if variables else "without"] += 1
         if not loaded.model.is_joint_action:
+            mutexes, soon, late = exclusions(loaded, space)
             seen["mutexes"] += sum(
-                not any({*pair} <= {*variable.facts} for variable in variables)
-                for pair in mutexes_of(loaded, space)
+                not any({*pair} <= {*variable.facts} for variable in variables) for pair in mutexes
             )
+            seen["soon"] += soon > 0
+            seen["late"] += late > 0
     assert seen["with variables"] >= 20
     assert seen["without"] >= 5
     assert seen["mutexes"] >= 5, "of facts of different variables"
+    assert min(seen["soon"], seen["late"]) >= 10
     assert all(seen[name, 1] > 5 for name in ("blind", "projections", "relaxed"))
     assert min(seen["projections", -1], seen["relaxed", -1]) > 5, "no dead end was found"
 
@@ -156,11 +169,8 @@ def test_layers_bounds_and_choices_are_those_of_the_whole_search(style: str) -> 
             continue
         assert found.next_steps is None
         space = explore(model, task.init[None, :])
-        first = int((space.rows == task.init).all(axis=1).argmax())
-        steps = nx.DiGraph(zip(space.sources.tolist(), space.target.tolist(), strict=True))
-        steps.add_node(first)
-        far = Counter(nx.single_source_shortest_path_length(steps, first).values())
-        sizes = [far[number] for number in sorted(far)]
+        begins = (space.rows == task.init).all(axis=1)
+        sizes = np.bincount(distances(space, begins, forward=True)).tolist()
         assert list(found.layers) == sizes == [len(rows) for rows in layers if len(rows)]
         assert found.states == len(space)
         assert model.stepper.most_steps(space.rows) >= len(space.labels)
