@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs of facts that exclude each other: soon after the start, ever, and shortly before the goal.
+"""How far two facts that are both true are from the start and from the goal, at least.
 
-The mutexes of a planning graph (Blum and Furst 1997; the pairs of h^2, Haslum and Geffner 2000) for
-the joint steps of this model, and the same from the goal backward (Alcazar and Torralba 2015).
-A table of exclusions is a symmetric table (facts, facts); its diagonal says which facts are false.
+The mutexes of a planning graph (Blum and Furst 1997; h^2, Haslum and Geffner 2000) for the joint
+steps of this model, and the same from the goal backward (Alcazar and Torralba 2015).
+A table of bounds is a symmetric table (facts, facts); on its diagonal are those of single facts.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Bools, Ints, Rows
-from planners.search.goals import FactsOf, goal_facts
+from planners.search.goals import FAR, FactsOf, goal_facts
 from planners.search.graphs import csgraph
 from planners.system.errors import OutOfMemory
 
@@ -29,32 +29,32 @@ _MOST = 8_000
 _BLOCK = 512
 
 
-def after_start(model: JointModel, init: Rows, block: int = _BLOCK) -> list[Bools]:
-    """Tables of exclusions by joint steps from the state ``init``; the last also after any more.
+def from_start(model: JointModel, init: Rows, block: int = _BLOCK) -> Ints:
+    """Bounds on the joint steps from ``init`` to a state that has two facts; `FAR`: none has both.
 
-    The joint steps must be composed.  There is one table, without exclusions, where labels make
-    facts true in more than `_MOST` ways, or where the memory has no room for scipy; ``block`` ways
-    are compared with the others at a time.
+    The joint steps must be composed.  All are 0 where labels make facts true in more than `_MOST`
+    ways, or where the memory has no room for scipy; ``block`` ways are compared with the others at
+    a time.
     """
     facts, ways = len(model.codec.facts), list(_ways(model))
     nothing = np.zeros((facts, facts), np.bool_)
     if not _fits(ways):
-        return [nothing]
+        return nothing.astype(np.int64)
     true = model.codec.true_facts(model.codec.facts_part(init))
     may = nothing.copy()
     may[np.ix_(true, true)] = True
-    return _tables(ways, _together(model, ways), may, nothing, block)
+    return _bounds(ways, _together(model, ways), may, nothing, block)
 
 
-def before_goal(model: JointModel, goal: Goal, never: Bools, block: int = _BLOCK) -> list[Bools]:
-    """Tables of exclusions by joint steps that are left to the goal; the last also with any more.
+def to_goal(model: JointModel, goal: Goal, never: Bools, block: int = _BLOCK) -> Ints:
+    """Bounds on the joint steps from a state that has two facts to the goal; `FAR`: it has no plan.
 
-    ``never`` are the exclusions of all states, the last table of `after_start`.
+    ``never`` are the pairs of facts that no state has; they are `FAR`, too.
     """
     back = list(_ways_back(model, never))
     ways = [way for way, _ in back]
     if not _fits(ways):
-        return [never]
+        return np.where(never, FAR, 0)
     facts, together = len(never), _together(model, ways)
     # What is needed before the step is true after it if nothing in the step may delete it.
     deleting = _table([way.adds for way in ways], facts)
@@ -66,19 +66,31 @@ def before_goal(model: JointModel, goal: Goal, never: Bools, block: int = _BLOCK
     beside = _table([before for _, before in back], facts) @ never.astype(np.float32) == 0
     together[:, len(ways) :] &= beside
     false = never[sorted(goal_facts(model, goal))].any(axis=0, keepdims=True)
-    return _tables(ways, together, ~(never | false | false.T), never, block)
+    return _bounds(ways, together, ~(never | false | false.T), never, block)
 
 
-def pairs(excluded: Bools, known: Bools) -> Ints:
-    """The pairs (p, q), p <= q, of a table of exclusions that another does not have: (pairs, 2).
+class Exclusions(NamedTuple):
+    """Pairs of facts (pairs, 2) that exclude each other from ``first`` steps on, before ``last``.
 
     (p, p) where fact p is false; such facts are in no other pair.
     """
-    new = excluded & ~known
-    false = new.diagonal()
-    apart = np.triu(new, 1) & ~false[:, None] & ~false
-    np.fill_diagonal(apart, false)
-    return np.argwhere(apart)
+
+    pairs: Ints
+    first: Ints
+    last: Ints
+
+    @classmethod
+    def of(cls, bounds: Ints) -> Exclusions:
+        """What a table of bounds excludes."""
+        alone = bounds.diagonal()
+        first = np.maximum(alone[:, None], alone)
+        np.fill_diagonal(first, 0)
+        apart = np.triu(first < bounds)
+        return cls(np.argwhere(apart), first[apart], bounds[apart])
+
+    def at(self, steps: int) -> Ints:
+        """The pairs of which states so many steps away have not both."""
+        return self.pairs[(self.first <= steps) & (steps < self.last)]
 
 
 class _Way(NamedTuple):
@@ -143,25 +155,22 @@ def _together(model: JointModel, ways: Sequence[_Way]) -> Bools:
     return np.hstack((fits | fits.T, deletes.toarray() == 0))
 
 
-def _tables(
-    ways: Sequence[_Way], together: Bools, may: Bools, never: Bools, block: int
-) -> list[Bools]:
-    """The tables of exclusions, step by step, until they do not change.
+def _bounds(ways: Sequence[_Way], together: Bools, may: Bools, never: Bools, block: int) -> Ints:
+    """In which step each pair of facts may be true first.
 
-    ``may`` are the pairs of facts that may be true at first.  Of the ways that may share a step
-    two make a pair of facts true, where all that they need may be.
+    ``may`` are those that may be at once.  Of the ways that may share a step two make a pair of
+    facts true that is not ``never``, where all that they need may be.
     """
     facts = len(may)
     # The ways of labels, then those of facts that stay true.
     staying = [frozenset((fact,)) for fact in range(facts)]
     needs = _table([*(way.needs for way in ways), *staying], facts)
     adds = _table([*(way.adds for way in ways), *staying], facts)
-    found, before = list[Bools](), -1
-    while (count := int(may.sum())) != before:  # pairs that may be true are added
-        before = count
-        found.append(~may)
+    bounds, steps = np.where(may, 0, FAR), 0
+    while (bounds == steps).any():  # pairs that may be true are added
+        steps += 1
         #: (ways, facts): how often one of what a way needs excludes the fact.
-        excluded = needs @ found[-1].astype(np.float32)
+        excluded = needs @ (~may).astype(np.float32)
         excludes = np.ascontiguousarray(excluded.T)
         possible = needs.multiply(excluded).sum(axis=1) == 0
         ready = np.flatnonzero(possible[: len(ways)])
@@ -171,8 +180,9 @@ def _tables(
             # Of tables that are dense, those by way are multiplied without a copy.
             added = adds.T @ np.ascontiguousarray(both.T, np.float32)
             new = added @ adds[some] > 0
-            may = may | ((new | new.T) & ~never)
-    return found
+            bounds[(new | new.T) & ~never & ~may] = steps
+        may = bounds < FAR
+    return bounds
 
 
 def _table(sets: Sequence[frozenset[int]], width: int) -> csr_array:

@@ -20,7 +20,8 @@ from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.joint.tables import Bools, Ints, unique_rows
 from planners.pddl.formula_tree import conjuncts, negated, signed, substituted
 from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Or, StepAtom, Truth
-from planners.search.mutexes import after_start, before_goal, pairs
+from planners.search.goals import FAR
+from planners.search.mutexes import Exclusions, from_start, to_goal
 from planners.search.questions import FixedPlans, Literals
 from planners.search.sat import flat_clauses
 from planners.search.state_variables import StateVariable, state_variables
@@ -46,9 +47,11 @@ class PlanFormula:
         self._makers: dict[tuple[int, bool], Literals] = defaultdict(list)
         #: Per robot and some of its labels, as bytes, the variable that they imply.
         self._implied: dict[tuple[int, bytes], int] = {}
+        start = from_start(model, task.init)
+        left = to_goal(model, task.goal, start >= FAR)
+        never = (start >= FAR) | (left >= FAR)
         #: What facts exclude each other soon after the start, and shortly before the goal.
-        self._soon = after_start(model, task.init)
-        self._late = before_goal(model, task.goal, self._soon[-1])
+        self._soon, self._late = (Exclusions.of(np.where(never, 0, own)) for own in (start, left))
         variables = state_variables(model, task.init)
         for variable in variables:
             self._exactly_one([fact + 1 for fact in variable.facts])
@@ -59,7 +62,7 @@ class PlanFormula:
                     self._action(robot, label, action)
         for i, j in combinations(range(len(model.robots)), 2):
             self._apart(i, j)
-        self._never_together(variables)
+        self._never_together(variables, never)
         goal = self._goal_clauses(task.goal)
         begins = self._fresh()
         begin = self._just(set(model.codec.true_facts(task.init)))
@@ -77,17 +80,16 @@ class PlanFormula:
         What a solver has learned of the way to the goal stays true of longer plans.  What follows
         for states soon after the start is said of plans of ``at_least`` so many steps.
         """
-        steps, never = plans.steps + 1, self._soon[-1]
+        steps = plans.steps + 1
         before = self.size * steps
         number = np.abs(self._flat_step)
         number[number > self.size] -= 2 * self.size
-        clauses = [np.sign(self._flat_step) * (number + before)]
-        clauses += [_apart(own, never, before) for own in self._late[:-1][steps : steps + 1]]
-        begins = before + self.size
+        step = np.sign(self._flat_step) * (number + before)
+        clauses, begins = [step, _excluding(self._late.at(steps), before)], before + self.size
         if steps >= at_least:
             clauses += [
-                _apart(own, never, self.size * (steps - depth), begins)
-                for depth, own in enumerate(self._soon[1:-1][:steps], 1)
+                _excluding(self._soon.at(depth), self.size * (steps - depth), begins)
+                for depth in range(1, steps + 1)
             ]
         plans.put_before(np.concatenate(clauses), before + np.array(self._first_label))
         return begins
@@ -191,11 +193,10 @@ class PlanFormula:
             ]
         return self._implied[key]
 
-    def _never_together(self, variables: Sequence[StateVariable]) -> None:
-        """Pairs of facts that exclude each other, of different variables."""
+    def _never_together(self, variables: Sequence[StateVariable], never: Bools) -> None:
+        """Pairs of facts that no plan has together, of different variables."""
         known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
-        never = self._soon[-1]
-        for one, other in pairs(never, np.zeros_like(never)).tolist():
+        for one, other in Exclusions.of(never.astype(np.int64)).pairs.tolist():
             if one == other:
                 self.step.append((-(one + 1),))
             elif one not in known or known[one] != known.get(other):
@@ -221,15 +222,14 @@ class PlanFormula:
         return [fact if fact - 1 in true else -fact for fact in facts]
 
 
-def _apart(excluded: Bools, never: Bools, before: int, where: int = 0) -> Ints:
+def _excluding(pairs: Ints, before: int, where: int = 0) -> Ints:
     """Clauses that exclude pairs of facts in a state, whose variables come after ``before``.
 
-    Only those that are not ``never`` true together; only ``where`` a literal holds.
+    Only ``where`` a literal holds.
     """
-    found = pairs(excluded, never)
-    clauses = np.zeros((len(found), 4), np.int64)
+    clauses = np.zeros((len(pairs), 4), np.int64)
     clauses[:, 0] = -where
-    clauses[:, 1:3] = -(found + 1 + before)
+    clauses[:, 1:3] = -(pairs + 1 + before)
     return clauses[:, 0 if where else 1 :].reshape(-1)
 
 

@@ -14,7 +14,7 @@ from planners.joint.tables import Bools, Ints
 from planners.loading import PlanningInstance
 from planners.search.goals import FAR
 from planners.search.heuristics import HEURISTICS, Bound, heuristic
-from planners.search.mutexes import after_start, before_goal, pairs
+from planners.search.mutexes import Exclusions, from_start, to_goal
 from planners.search.optimal_plans import search
 from planners.search.reachable import Space, explore
 from planners.search.search_estimate import estimate
@@ -59,22 +59,23 @@ def variables_of(loaded: PlanningInstance, space: Space) -> list[StateVariable]:
 
 
 def exclusions(loaded: PlanningInstance, space: Space) -> tuple[list[list[int]], int, int]:
-    """Pairs of facts that no state has; how many more are excluded near the start and the goal."""
+    """Pairs of facts that no state has; how many more are excluded at the start and the goal."""
     model, task = loaded.model, loaded.tasks[0]
-    soon = after_start(model, task.init)
-    late = before_goal(model, task.goal, soon[-1])
-    assert all(map(np.array_equal, soon, after_start(model, task.init, block=1)))
-    assert all(map(np.array_equal, late, before_goal(model, task.goal, soon[-1], block=1)))
+    start = from_start(model, task.init)
+    assert (start == from_start(model, task.init, block=1)).all()
+    left = to_goal(model, task.goal, start == FAR)
+    assert (left == to_goal(model, task.goal, start == FAR, block=1)).all()
     begins = (space.rows == task.init).all(axis=1)
     truth, goals = model.codec.truth(space.rows), model.holds(task.goal, space.rows)
-    both = (soon, distances(space, begins, forward=True)), (late, distances(space, goals))
-    for tables, far in both:
-        for steps, table in enumerate(tables):
-            last = len(space) if steps == len(tables) - 1 else steps
-            near = truth[(far >= 0) & (far <= last)].astype(int)
-            assert not (near.T @ near)[table].any(), "excluded facts are both true"
-    known = pairs(soon[-1], np.zeros_like(soon[-1]))
-    return known.tolist(), *(len(pairs(own[0], soon[-1])) for own in (soon, late))
+    both = (start, distances(space, begins, forward=True)), (left, distances(space, goals))
+    for bounds, far in both:
+        found = Exclusions.of(bounds)
+        for state in np.flatnonzero(far >= 0):
+            excluded = found.at(int(far[state]))
+            assert not truth[state][excluded].all(axis=1).any(), "excluded facts are both true"
+    never = start == FAR
+    known = Exclusions.of(never.astype(int)).pairs.tolist()
+    return known, *(len(Exclusions.of(np.where(never, 0, own)).at(0)) for own in (start, left))
 
 
 def test_random_models() -> None:
