@@ -16,7 +16,7 @@ from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import DomainsOptions, ImportOptions, OutputFile, TasksOptions
 from coordlang.commands.terminal import echo, write
 from coordlang.language.listed import ListedTask, tasks_text, varied_tasks
-from coordlang.sites.shipped import about, domain_names, shipped_domains
+from coordlang.sites import about, shipped_domains
 from planners.system.errors import UsageError, note
 from planners.system.messages import Presented, counted, echoed, visible
 from planners.system.writing import copy_folders, write_texts
@@ -26,7 +26,7 @@ from planners.system.writing import copy_folders, write_texts
 def domains(_: Arguments, options: DomainsOptions) -> list[str]:
     """The names of the domains that are listed or were copied."""
     copy, shipped = options.copy, shipped_domains()
-    names = domain_names(shipped)
+    names = sorted(path.parent.name for path in shipped.glob("*/domain.pddl"))
     if copy is None:
         return names
     if copy[0] not in ("all", *names):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
-from coordlang.sites.shipped import shipped_domains
+from coordlang.sites import shipped_domains
 from planners.pddl.pddl_text import named_like
 from planners.system.errors import BadInput, Position
 from planners.system.files import read_bytes
