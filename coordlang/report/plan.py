@@ -80,12 +80,8 @@ def heat_of(
     first = selection.tasks[0].language
     if first.model.hides_slack or language.may_fail:
         return None
-    is_few = len(language.states) ** 2 * len(first.model.robots) <= _MOST_PAIRS
-    if (
-        language.provenance.tasks.get("kind") == "all"
-        and is_few
-        and not first.model.is_asynchronous
-    ):
+    is_all = language.provenance.tasks.get("kind") == "all" and not first.model.is_asynchronous
+    if is_all and len(language.states) ** 2 * len(first.model.robots) <= _MOST_PAIRS:
         with suppress(BadInput, ProvedImpossible):  # a language may be used on another map
             candidates = recorded_candidates(language, domain, [*problems], options, position)
             found = differences(candidates, Workers(), most=_MIXTURES).divergences
