@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
@@ -35,6 +35,7 @@ from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.minimal import refuting_clauses
 from coordlang.vocabulary.repair import repair
 from planners.joint.model import NO_FACT
+from planners.joint.states import StateCodec
 from planners.parallel.workers import Workers
 from planners.search.portions import require_room
 from planners.system.errors import BadInput, OutOfMemory, Refuted, UsageError
@@ -177,24 +178,26 @@ def repair_language(making: Making, start: Language, seed: int) -> Built:
     """
     job = making.job(MethodOptions(seed=seed))
     making.note("coordination")
-    old = _Old.of(start, making.candidates)
-    known, number = old.language, {word: n for n, word in enumerate(old.language.words)}
-    words = {s: number[known.states[k]] for s, k in old.keys(job.states) if k in known.states}
+    model, rows = making.candidates.model, making.candidates.rows
+    keys = {state: model.codec.key(rows[state]) for state in job.states}
+    known = _known_here(start, model.codec)
+    number = {word: n for n, word in enumerate(known.words)}
+    words = {s: number[known.states[k]] for s, k in keys.items() if k in known.states}
     making.progress("verifying the old language")
-    partition = known.partition(making.candidates.model)
+    partition = known.partition(model)
     verdict = verify_candidates(partition, making.candidates, making.workers, making.progress)
     making.note("verify")
-    repaired = Repaired(verdict.witness, new_states=len(job.states) - len(words), gone=old.gone)
+    gone = len(start.states) - len(known.states)
+    repaired = Repaired(verdict.witness, new_states=len(keys) - len(words), gone=gone)
     if verdict.holds:
         making.verified.append((words, partition, verdict))
         # What the old file claims of fewer words is not believed: the bound is the job's.
         return making.built(job, Outcome(words, job.lower_bound), REPAIR, repaired=repaired)
-    model = making.candidates.model
-    making.partition_of = lambda found: old.repaired(found).partition(model)
+    making.partition_of = lambda found: _with_words(known, keys, found).partition(model)
     result = repair(job, words, len(number), number[known.default])
     making.note("repair")
-    now = old.repaired(result.partition)
-    changed = sorted(key for _, key in old.keys(result.changed))
+    now = _with_words(known, keys, result.partition)
+    changed = sorted(keys[state] for state in result.changed)
     repaired = replace(
         repaired,
         changed=tuple(ChangedState(key, known.states[key], now.states[key]) for key in changed),
@@ -203,6 +206,28 @@ def repair_language(making: Making, start: Language, seed: int) -> Built:
         new_words_bound=result.new_words_bound,
     )
     return making.built(job, result, REPAIR, repaired=repaired)
+
+
+def _known_here(language: Language, codec: StateCodec) -> Language:
+    """A language without the states that this model does not have."""
+    kept = {}
+    for key, word in language.states.items():
+        with suppress(BadInput):
+            read_key(codec, key)
+            kept[key] = word
+    return replace(language, states=kept)
+
+
+def _with_words(old: Language, keys: Mapping[int, str], assignment: Assignment) -> Language:
+    """A language with other words of some states; words without states are left out."""
+    names = dict(enumerate(old.words))
+    new = (name for name in (f"w{n}" for n in count()) if name not in old.words)
+    names |= zip(sorted({*assignment.values()} - names.keys()), new, strict=False)
+    states = {**old.states, **{keys[state]: names[word] for state, word in assignment.items()}}
+    sizes = Counter(states.values())
+    words = tuple(word for word in names.values() if sizes[word])
+    default = old.default if sizes[old.default] else max(words, key=sizes.__getitem__)
+    return replace(old, words=words, states=states, default=default)
 
 
 class Making:
@@ -281,40 +306,6 @@ class Making:
             provenance = replace(provenance, tolerance=tolerance)
         language = Language.of(partition, self.candidates.model, provenance)
         return Built(language, job, verdict, found, self.seconds, **more)
-
-
-@dataclass(frozen=True, slots=True)
-class _Old:
-    """Words to repair, of those old states that this model has; so many others are ``gone``."""
-
-    language: Language
-    candidates: Candidates
-    gone: int
-
-    @classmethod
-    def of(cls, language: Language, candidates: Candidates) -> _Old:
-        kept = {}
-        for key, word in language.states.items():
-            with suppress(BadInput):
-                read_key(candidates.model.codec, key)
-                kept[key] = word
-        return cls(replace(language, states=kept), candidates, len(language.states) - len(kept))
-
-    def keys(self, states: Iterable[int]) -> Iterator[tuple[int, str]]:
-        """Candidate states with their keys."""
-        rows, codec = self.candidates.rows, self.candidates.model.codec
-        return ((state, codec.key(rows[state])) for state in states)
-
-    def repaired(self, assignment: Assignment) -> Language:
-        """The language with other words of some states; words without states are left out."""
-        old, names = self.language, dict(enumerate(self.language.words))
-        new = (name for name in (f"w{n}" for n in count()) if name not in old.words)
-        names |= zip(sorted({*assignment.values()} - names.keys()), new, strict=False)
-        states = {**old.states, **{k: names[assignment[n]] for n, k in self.keys(assignment)}}
-        sizes = Counter(states.values())
-        words = tuple(word for word in names.values() if sizes[word])
-        default = old.default if sizes[old.default] else max(words, key=sizes.__getitem__)
-        return replace(old, words=words, states=states, default=default)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
