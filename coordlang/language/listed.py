@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,7 +26,7 @@ from planners.pddl.model_options import ModelOptions
 from planners.pddl.names import Names
 from planners.pddl.robots import fluent_predicates
 from planners.pddl.sexpr import Source, parse
-from planners.search.optimal_plans import distances
+from planners.search.optimal_plans import distances_to
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Position, ProvedImpossible, UsageError, note
 from planners.system.files import FileFormat, doc, read_bytes
@@ -221,29 +221,26 @@ def varied_tasks(
     free = [fact for pattern in starts for fact in _matching(names, pattern)]
     own = facts[space.numbers(task.init[None, :])[0]]
     here = np.flatnonzero(np.delete(facts == own, free, axis=1).all(axis=1))
-    texts, reached = [goal_atoms(task.goal)], [model.holds(task.goal, space.rows)]
+    wanted: list[Goal] = [task.goal]
     if goals:
-        wanted = _goals(facts, [_matching(names, pattern) for pattern in goals])
-        texts = [_named(names, goal) for goal in wanted]
-        reached = [np.all(facts[:, list(goal)], axis=1) for goal in wanted]
-    found: list[ListedTask] = []
-    size = max(1, _BATCH // len(space))
-    for first in range(0, len(reached), size):
-        far = distances(space, np.stack(reached[first : first + size]))[:, here]
-        for goal, start in np.argwhere(far > 0).tolist():
-            init = _named(names, np.flatnonzero(facts[here[start]]))
-            found.append(ListedTask(init, texts[goal + first]))
+        atoms = model.codec.facts.atoms
+        chosen = _goals(facts, [_matching(names, pattern) for pattern in goals])
+        wanted = [And(tuple(atoms[fact] for fact in goal)) for goal in chosen]
+    size, found = max(1, _BATCH // len(space)), list[ListedTask]()
+    some = (wanted[first : first + size] for first in range(0, len(wanted), size))
+    away = chain.from_iterable(distances_to(space, own) for own in some)
+    for goal, far in zip(wanted, away, strict=True):
+        text = goal_atoms(goal)
+        for start in here[far[here] > 0].tolist():
+            init = tuple(names[fact] for fact in np.flatnonzero(facts[start]))
+            found.append(ListedTask(init, text))
     if not found:
         raise ProvedImpossible(
-            f"there is no such task: none of {len(here):,} starts reaches one of {len(texts):,} "
+            f"there is no such task: none of {len(here):,} starts reaches one of {len(wanted):,} "
             "goals that it is not at",
             remedy="Give patterns that match more atoms: ? stands for any one name.",
         )
     return tuple(sorted(found, key=lambda task: (task.init, task.goal)))
-
-
-def _named(names: Sequence[str], facts: Iterable[int]) -> tuple[str, ...]:
-    return tuple(names[fact] for fact in facts)
 
 
 def _goals(facts: Bools, matching: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:

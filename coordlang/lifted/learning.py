@@ -101,9 +101,10 @@ def merge_classes(
     whether no partition of these classes into fewer words is proved to be a language.
     """
     words = list(range(count))
-    clauses = dict.fromkeys(
+    known = (
         _over_classes(clause, own) for taken, own in classes.items() for clause in taken.clauses
     )
+    clauses = [*dict.fromkeys(known)]
     while (size := len(set(words)) - 1) > 0:
         try:
             found = _partition(count, size, classes, clauses)
@@ -117,24 +118,19 @@ def merge_classes(
 
 
 def _partition(
-    count: int, size: int, classes: Mapping[_Taken, Ints], clauses: dict[Clause, None]
+    count: int, size: int, classes: Mapping[_Taken, Ints], clauses: list[Clause]
 ) -> dict[int, int] | None:
     """A partition of the classes that nothing refutes; None if there is none of this size.
 
     Clauses that are met on the way are added to the known ones.
     """
     with closing(PartitionProblem(range(count), size)) as problem:
-        for clause in clauses:
-            problem.separate_one(clause)
-        while (found := problem.solve(_CONFLICTS)) is not None:
-            violated = _violated(found, classes)
-            if not violated:
-                break
-            for clause in violated:
-                if clause not in clauses:
-                    clauses[clause] = None
-                    problem.separate_one(clause)
-    return found
+        while True:
+            problem.require(clauses)
+            found = problem.solve(_CONFLICTS)
+            if found is None or not (violated := _violated(found, classes)):
+                return found
+            clauses += dict.fromkeys(violated)
 
 
 def _violated(words: Mapping[int, int], classes: Mapping[_Taken, Ints]) -> list[Clause]:

@@ -101,13 +101,11 @@ def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
         while (partition := problem.solve(_EASY)) is not None:
             words = words_of_states(partition, 1 + max(states, default=0))
             apart = words[pairs[:, 0]] != words[pairs[:, 1]]
-            held = np.logical_or.reduceat(apart, bounds) if len(clauses) else apart
-            broken = np.flatnonzero(~held)
+            broken = np.flatnonzero(~np.logical_or.reduceat(apart, bounds))
             if not len(broken):
                 raise ValueError(f"the clauses leave a partition into {size} words")
-            for number in broken[:_AT_ONCE].tolist():
-                problem.separate_one(clauses[number])
-                kept.append(clauses[number])
+            kept += (clauses[number] for number in broken[:_AT_ONCE].tolist())
+            problem.require(kept)
     return kept
 
 
