@@ -252,7 +252,9 @@ def learn(
 class _Taken:
     """A problem that is learned from, with the clauses that it gave.
 
-    ``table`` has the values of all features that there are: (features, states).
+    ``refuted``: words of its states that give the first clauses: with many robots plans fail in too
+    many ways for all of them to be looked at.  ``table`` has the values of all features that there
+    are: (features, states).
     """
 
     def __init__(self, own: Instance, seed: int, progress: Progress, refuted: Ints | None) -> None:
@@ -282,20 +284,11 @@ class _Learner:
         workers: Workers,
         progress: Progress,
     ) -> None:
-        self.taken: list[_Taken] = []
+        self.taken = [_Taken(own, seed, progress, None) for own in known]
         self.rounds = 0
         self._every, self._workers = [*known, *held_back], workers
         self._complexity, self._seed, self._progress = complexity, seed, progress
-        for own in known:
-            self.take(own)
         self.begin()
-
-    def take(self, own: Instance, refuted: Ints | None = None) -> None:
-        """Learn from this problem, too; words of its states that it refutes give the first clauses.
-
-        With many robots plans fail in too many ways for all of them to be looked at.
-        """
-        self.taken.append(_Taken(own, self._seed, self._progress, refuted))
 
     def begin(self, landmarks: bool = False) -> None:
         """Find the features that there are in the problems that were taken."""
@@ -322,7 +315,7 @@ class _Learner:
                 if not own.holds(of_states, self._workers, self._progress):
                     known = (taken.own for taken in self.taken)
                     assert own not in known, "what was learned from is a language there"
-                    self.take(own, of_states)
+                    self.taken.append(_Taken(own, self._seed, self._progress, of_states))
                     self.begin(self.landmarks)
                     break
             else:

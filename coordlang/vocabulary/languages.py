@@ -17,8 +17,7 @@ import numpy as np
 from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
-from coordlang.vocabulary.counterexamples import Mixtures
+from coordlang.vocabulary.counterexamples import CounterexampleWalk, Mixtures
 from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
 from coordlang.vocabulary.job import Assignment, Evidence, Job, words_of_states
 from coordlang.vocabulary.sat import without_implied

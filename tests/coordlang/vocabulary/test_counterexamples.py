@@ -15,8 +15,7 @@ from coordlang.language.candidates import from_problems
 from coordlang.language.sentences import sentence
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
-from coordlang.vocabulary.counterexamples import Mixtures
+from coordlang.vocabulary.counterexamples import CounterexampleWalk, Mixtures
 from coordlang.vocabulary.failing_tuples import FailingTuples, plan_states
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
