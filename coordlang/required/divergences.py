@@ -214,11 +214,9 @@ class _Mixing:
         missing = [row[:0]]
         for robot, (first, labels) in enumerate(self._labels):
             own = ways[row, robot]
-            if len(labels) > len(self._node):  # more than one label on some way
-                counts = first[own + 1] - first[own]
-                own = ranges(first[own], counts)
-                row, prefix = np.repeat(row, counts), np.repeat(prefix, counts)
-            prefix = self._index.follow(robot, prefix, labels[own])
+            counts = first[own + 1] - first[own]
+            row, prefix = np.repeat(row, counts), np.repeat(prefix, counts)
+            prefix = self._index.follow(robot, prefix, labels[ranges(first[own], counts)])
             missing.append(row[prefix < 0])
             row, prefix = row[prefix >= 0], prefix[prefix >= 0]
         nodes = np.column_stack((self._target[ways[row]], self._space.targets(prefix)))

@@ -112,7 +112,7 @@ def differences(
                 found, rows = [_merged(found)], 0
             progress(f"looking where coordination is required: {so_far()}")
     merged = _merged(found)
-    return _read(merged if goals is None else merged | _images(merged, goals))
+    return _read(merged if goals is None else merged | goals.images(merged))
 
 
 def _of_goals(shared: tuple[Source, Ints | None, float], goals: range) -> Table:
@@ -154,14 +154,6 @@ def _read(table: Table) -> FirstDifferences:
     return FirstDifferences(table.get("divergences"), table["states"], *figures)
 
 
-def _images(merged: Table, goals: SymmetricGoals) -> Table:
-    """States and divergences of all goals, from those chosen; figures are of all already."""
-    images = {"states": goals.images_of_states(merged["states"])}
-    if "divergences" in merged:
-        images["divergences"] = minimal(goals.images_of_rows(merged["divergences"]))
-    return images
-
-
 def _merged(found: Sequence[Table]) -> Table:
     """What some jobs found as one."""
     listed: Table = {}
@@ -198,11 +190,15 @@ class SymmetricGoals:
         """The goals that speak for all, sorted."""
         return np.unique(self.representative)
 
-    def images_of_states(self, states: Ints) -> Ints:
-        """The images of states under all symmetries of the group, sorted."""
-        return np.flatnonzero(np.isin(self.representative, self.representative[states]))
+    def images(self, found: Table) -> Table:
+        """States and divergences of all goals, from those chosen; figures are of all already."""
+        alike = self.representative
+        images = {"states": np.flatnonzero(np.isin(alike, alike[found["states"]]))}
+        if "divergences" in found:
+            images["divergences"] = minimal(self._images_of_rows(found["divergences"]))
+        return images
 
-    def images_of_rows(self, rows: Ints) -> Ints:
+    def _images_of_rows(self, rows: Ints) -> Ints:
         """The images of rows (state, other states sorted, -1 to fill up), sorted, each once."""
         known, _ = unique_rows(rows.astype(np.uint64))
         new = known

@@ -24,9 +24,9 @@ from coordlang.vocabulary.job import Job
 from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.loop import Budget, find
 from coordlang.vocabulary.minimal import MinimalSearch
+from coordlang.vocabulary.one_task import TwoWords
 from coordlang.vocabulary.plan_pairs import PlanPairs
 from coordlang.vocabulary.sat import END, START, Undecided
-from coordlang.vocabulary.two_words import TwoWords
 from coordlang.vocabulary.warped_pairs import PairsApart, WarpedPairs, failing_pairs
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
