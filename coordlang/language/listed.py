@@ -7,7 +7,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain, product
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -225,15 +225,15 @@ def varied_tasks(
     if goals:
         atoms = model.codec.facts.atoms
         chosen = _goals(facts, [_matching(names, pattern) for pattern in goals])
-        wanted = [And(tuple(atoms[fact] for fact in goal)) for goal in chosen]
+        wanted = [And(tuple(map(atoms.__getitem__, goal))) for goal in chosen]
     size, found = max(1, _BATCH // len(space)), list[ListedTask]()
-    some = (wanted[first : first + size] for first in range(0, len(wanted), size))
-    away = chain.from_iterable(distances_to(space, own) for own in some)
-    for goal, far in zip(wanted, away, strict=True):
-        text = goal_atoms(goal)
-        for start in here[far[here] > 0].tolist():
-            init = tuple(names[fact] for fact in np.flatnonzero(facts[start]))
-            found.append(ListedTask(init, text))
+    for first in range(0, len(wanted), size):
+        some = wanted[first : first + size]
+        for goal, far in zip(some, distances_to(space, some), strict=True):
+            text = goal_atoms(goal)
+            for start in here[far[here] > 0].tolist():
+                init = tuple(map(names.__getitem__, np.flatnonzero(facts[start])))
+                found.append(ListedTask(init, text))
     if not found:
         raise ProvedImpossible(
             f"there is no such task: none of {len(here):,} starts reaches one of {len(wanted):,} "
