@@ -14,9 +14,9 @@ from coordlang.language.sentences import sentence
 from planners.joint.tables import Rows
 from planners.search.goals import FAR
 from planners.search.heuristics import HEURISTICS, Bound, heuristic
+from planners.search.optimal_plans import rests
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
-from planners.search.slack import rests
 
 #: (joint steps, second component of the cost).
 Cost = tuple[int, int]

@@ -145,9 +145,9 @@ class JointModel:
     ``labels[i]`` are robot i's labels, ``labels[i][0]`` being idle.  ``actions`` are the ground
     actions it is made of.  Every robot may always idle (joint-action PDDL says itself who idles);
     ``idling_costs[i]`` is what that adds to the second cost.  ``slack`` is how many steps more
-    than the least makespan plans may take (`planners.search.slack`); ``slack_facts``, where states
-    on plans say how many of them are left, are the numbers of the facts that do: none left, one
-    left, and so on.  ``impossible`` says what robots can never do, for messages.
+    than the least makespan plans may take (`planners.search.optimal_plans`); ``slack_facts``, where
+    states on plans say how many of them are left, are the numbers of the facts that do: none left,
+    one left, and so on.  ``impossible`` says what robots can never do, for messages.
     ``is_asynchronous``: robots keep no common step, and the labels of plan spaces are events
     (`planners.search.asynchronous`).  The model of such a space has these ``events`` by label, the
     ``step_model`` whose subactions they are, and ``has_ties`` (`planners.joint.traces.Traces`).

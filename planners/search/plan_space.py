@@ -5,7 +5,7 @@ Costs are lexicographic, makespan first: with ``d(s)`` the cost from ``s`` to th
 plans from ``I`` are exactly the paths of edges ``s -> t`` with ``d(s) = c(edge) + d(t)``.  All of
 them have the same length (Proposition 1 of docs/concepts.md).  Plans within slack are paths of the
 same kind of graph: all have as many steps as are allowed, the last of them at rest
-(`planners.search.slack`).
+(`planners.search.optimal_plans`).
 """
 
 from __future__ import annotations

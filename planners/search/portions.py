@@ -20,10 +20,9 @@ from planners.parallel.batch import digest
 from planners.search.asynchronous import as_executed
 from planners.search.graphs import parts_of_graph
 from planners.search.kept_plans import model_digest
-from planners.search.optimal_plans import distances_to, plan_space, plan_spaces
+from planners.search.optimal_plans import distances_to, plan_space, plan_spaces, seen_rows
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, Space
-from planners.search.slack import seen_rows
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
 
