@@ -167,7 +167,7 @@ def _bounds(ways: Sequence[_Way], together: Bools, may: Bools, never: Bools, blo
     needs = _table([*(way.needs for way in ways), *staying], facts)
     adds = _table([*(way.adds for way in ways), *staying], facts)
     bounds, steps = np.where(may, 0, FAR), 0
-    while (bounds == steps).any():  # pairs that may be true are added
+    while not steps or (bounds == steps).any():  # pairs that may be true are added
         steps += 1
         #: (ways, facts): how often one of what a way needs excludes the fact.
         excluded = needs @ (~may).astype(np.float32)
