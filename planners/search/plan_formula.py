@@ -51,7 +51,8 @@ class PlanFormula:
         left = to_goal(model, task.goal, start >= FAR)
         never = (start >= FAR) | (left >= FAR)
         #: What facts exclude each other soon after the start, and shortly before the goal.
-        self._soon, self._late = (Exclusions.of(np.where(never, 0, own)) for own in (start, left))
+        self._soon = Exclusions.of(np.where(never, 0, start))
+        self._late = Exclusions.of(np.where(never, 0, left))
         variables = state_variables(model, task.init)
         for variable in variables:
             self._exactly_one([fact + 1 for fact in variable.facts])
