@@ -23,7 +23,7 @@ from coordlang.verification.by_definition import inseparable, refuting_goal
 from planners.joint.tables import Ints, find_rows, unique_rows
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
-from planners.search.graphs import parts_of_graph
+from planners.search.graphs import orbits
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import PORTION, Explored, Source, cut
 from planners.system.limits import reaching
@@ -236,7 +236,6 @@ def symmetric_goals(
     generators = [s.states for s in found if (s.states != np.arange(states)).any()]
     if not generators:
         return None
-    here = np.tile(np.arange(states), len(generators))
-    _, orbit = parts_of_graph(states, here, np.concatenate(generators))
+    orbit = orbits(generators)
     _, first = np.unique(orbit, return_index=True)
     return SymmetricGoals(tuple(generators), first[orbit])

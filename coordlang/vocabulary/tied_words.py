@@ -23,7 +23,7 @@ from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.loop import Budget, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, unique_rows
-from planners.search.graphs import parts_of_graph
+from planners.search.graphs import orbits
 from planners.search.sat import whole
 
 #: Clauses that are taken of a refuted partition, before their images; and failing tuples after
@@ -64,7 +64,8 @@ class TiedWords:
         else:  # these load networkx
             from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 
-            tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
+            tied = abstractions(job.candidates, job.states)
+            tied += [orbits([image]) for image in self._images[1:]]
             tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
             yield from up_to_symmetry(tied, self._images)
 
@@ -185,11 +186,6 @@ class _Kind:
             images.append(np.sort(np.where((codes < 0) | (a == b), -1, pairs), axis=1))
         for row in np.unique(np.concatenate(images), axis=0).tolist():
             self.problem.separate_one({divmod(code, states) for code in row if code >= 0})
-
-
-def _orbits(to: Ints) -> Ints:
-    """(states) a number for each set of states that a symmetry takes to each other."""
-    return parts_of_graph(len(to), np.arange(len(to)), to)[1]
 
 
 # ---- few facts that decide the words of one task

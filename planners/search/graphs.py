@@ -6,11 +6,12 @@ from __future__ import annotations
 import math
 import os
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from planners.joint.tables import Ints, Numbers
+from planners.joint.tables import Ints
 from planners.system.errors import OutOfMemory
 from planners.system.limits import address_space_left, more_memory
 
@@ -20,19 +21,19 @@ _LIBRARY = 192 << 20
 _THREADS = "OPENBLAS_NUM_THREADS"
 
 
-def parts_of_graph(
-    size: int, sources: Ints, targets: Numbers, *, directed: bool = False
-) -> tuple[int, Ints]:
-    """How many components a graph has (with ``directed`` strong ones), and each node's number.
+def orbits(permutations: Sequence[Ints]) -> Ints:
+    """(elements) a number for each set of elements that permutations take to each other.
 
-    ``sources`` and ``targets`` are the ends of each edge.  Raises `OutOfMemory` as `csgraph` does.
+    Raises `OutOfMemory` as `csgraph` does.
     """
     sparse = csgraph()
     from scipy.sparse import csr_matrix
 
-    graph = csr_matrix((np.ones(len(sources)), (sources, targets)), (size, size))
-    count, component = sparse.connected_components(graph, directed=directed, connection="strong")
-    return int(count), component
+    size, targets = len(permutations[0]), np.concatenate(permutations)
+    sources = np.tile(np.arange(size), len(permutations))
+    graph = csr_matrix((np.ones(len(targets)), (sources, targets)), (size, size))
+    orbit: Ints = sparse.connected_components(graph, directed=False)[1]
+    return orbit
 
 
 def csgraph() -> Any:

@@ -18,7 +18,6 @@ from planners.joint.model import FullState, Goal, JointModel
 from planners.joint.tables import Ints, Rows
 from planners.parallel.batch import digest
 from planners.search.asynchronous import as_executed
-from planners.search.graphs import parts_of_graph
 from planners.search.kept_plans import model_digest
 from planners.search.optimal_plans import distances_to, plan_space, plan_spaces, seen_rows
 from planners.search.plan_space import PlanSpace
@@ -90,12 +89,12 @@ class Explored:
         bare = not (model.slack or model.is_asynchronous or self.space.cost.any())
         return bare and self.is_every_pair
 
-    @property
+    @cached_property
     def tasks(self) -> int:
         """How many there are: pairs of a goal and another state that reaches it, for None."""
         listed = sum(len(inits) for _, inits in self.goals if inits is not None)
         free = [goal for goal, inits in self.goals if inits is None]
-        return listed + _pairs(self.space, free)
+        return listed + sum(int((far > 0).sum()) for far in distances_to(self.space, free))
 
     @property
     def identity(self) -> str:
@@ -228,19 +227,6 @@ def require_room(source: Source) -> None:
             f"{left / 2**30:,.1f} GiB are left",
             remedy=f"Use --method greedy, fewer candidate tasks, or {more_memory()}.",
         )
-
-
-def _pairs(space: Space, goals: Sequence[Goal]) -> int:
-    """How many pairs there are of a goal and a state that reaches it in one step or more."""
-    if not goals:
-        return 0
-    size = len(space)
-    full = all(isinstance(goal, FullState) for goal in goals)
-    if full and space.model.holds(goals[0], space.rows).sum() == 1:
-        parts, _ = parts_of_graph(size, space.sources, space.target, directed=True)
-        if parts == 1:
-            return len(goals) * (size - 1)
-    return sum(int((far > 0).sum()) for far in distances_to(space, goals))
 
 
 def _of_model(model: JointModel) -> tuple[object, ...]:

@@ -28,10 +28,11 @@ from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.sat import PartitionProblem
-from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits, classes_by_facts
+from coordlang.vocabulary.tied_words import TiedWords, _Kind, classes_by_facts
 from planners.joint.tables import Ints
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
+from planners.search.graphs import orbits
 from tests.support.candidates import failing, is_language, small_candidates
 from tests.support.domains import all_tasks, own_task
 
@@ -75,7 +76,7 @@ def test_what_is_found_is_a_language_of_its_kind(stem: str, least: int) -> None:
         len({(language[s], other) for s, other in zip(job.states, tied, strict=True)})
         == len({*tied})
         for tied in (
-            *(_orbits(np.array(to))[list(job.states)] for to in languages.group.permutations),
+            *(orbits([np.array(to)])[list(job.states)] for to in languages.group.permutations),
             *(a[list(job.states)] for a in abstractions(candidates, job.states)),
         )
     ), "the word does not change with the state's image, or an abstraction says the word"
@@ -108,7 +109,7 @@ def test_partitions_of_a_kind_are_found_iff_there_are_some() -> None:
     one, other = np.array([1, 0, 3, 2, 4, 5]), np.array([0, 1, 2, 3, 5, 4])
     images = [np.arange(6), one, other, one[other]]
     answers = Counter[bool]()
-    for tied in [_orbits(one), _orbits(other), np.array([0, 1, 0, 1, 2, 3])] * 10:
+    for tied in [orbits([one]), orbits([other]), np.array([0, 1, 0, 1, 2, 3])] * 10:
         kind = _Kind(np.arange(6), tied, 2, images, Budget())
         firsts = kind.first.tolist()
         left = [w for w in product(range(2), repeat=6) if w == tuple(w[s] for s in firsts)]
