@@ -10,12 +10,12 @@ monitor only, and numbers and texts are all that goes in and out.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 from typing import Literal
 
-from coordlang.execution.monitor import IDLE, EventMonitor, Monitor, NotPossible, drawn
+from coordlang.execution.monitor import EventMonitor, Monitor, NotPossible, drawn
 
 Kind = Literal["step", "word", "ended", "ready"]
 
@@ -89,18 +89,8 @@ class Pace:
         return round(time / self.period) - steps if self._way == "clock" else 0
 
 
-@dataclass(frozen=True, slots=True)
-class OwnWords:
-    """How far in the sentence a robot may be after own subactions, whatever the others choose.
-
-    An automaton over own subactions, from state 0: ``moves[s]`` leads on, ``words[s]`` is the
-    greatest number of words that plans of the sentence have passed there.
-    """
-
-    moves: Sequence[Mapping[str, int]]
-    words: Sequence[int]
-
-
+#: How many words of the sentence are passed at most after own subactions, whatever others choose.
+OwnWords = Callable[[Sequence[str | None]], int]
 #: Metres x, metres y, heading in radians (0: to the right, counterclockwise).
 Pose = tuple[float, float, float]
 #: Metres a second ahead, radians a second to the left.
@@ -136,23 +126,6 @@ def period(longest: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Sensed:
-    """What a robot is told in a tick.
-
-    ``time`` are seconds since the start, ``pose`` is where it believes to be.  ``ahead`` is how far
-    from its middle the lidar sees the first thing in its way, in metres: infinite where there is
-    none, None where it did not look.  ``heard`` are the messages of the tick before, ``wanted``
-    atoms that it is to visit from now on, if it can.
-    """
-
-    time: float
-    pose: Pose
-    ahead: float | None
-    heard: tuple[Notice, ...] = ()
-    wanted: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class OwnStep:
     """A robot's step or event: its number from 0, the subaction (None: idle), times in seconds.
 
@@ -174,7 +147,8 @@ class Robot:
     ``radius`` is its own, in metres.  It follows ``monitor``, its choices, and draws among them
     with ``random``.  ``points`` are the places in metres, ``leads`` the place that each own
     subaction leads to, if it leads anywhere.  ``words`` says how far in the sentence own subactions
-    may lead; None where no sentence is agreed.
+    may lead; None where no sentence is agreed.  ``wishes`` are the atoms that it comes to want to
+    visit when it has done so many steps.
     """
 
     def __init__(
@@ -187,12 +161,13 @@ class Robot:
         words: OwnWords | None,
         pace: Pace,
         random: Random,
+        wishes: Mapping[int, Sequence[str]],
     ) -> None:
         self.name = name
         self.steps: list[OwnStep] = []
         self._radius, self._points, self._leads = radius, points, leads
         self._monitor, self._pace = monitor, pace
-        self._random, self._own_words, self._word_state = random, words, 0
+        self._random, self._own_words, self._wishes = random, words, dict(wishes)
         #: Own steps done, and words of the sentence passed at most, by its own account.
         self.done = self.words = 0
         self._is_turning = False
@@ -207,11 +182,6 @@ class Robot:
     def finished(self) -> bool:
         """Whether all own steps are done."""
         return self._monitor.finished and not self._is_underway
-
-    @property
-    def chooses_next(self) -> bool:
-        """Whether it is about to choose a step, and has to be told what it is to visit."""
-        return not self._is_underway and not self._monitor.finished
 
     @property
     def looks_ahead(self) -> bool:
@@ -233,25 +203,32 @@ class Robot:
             ahead = ahead.after(chosen[-1])
         return chosen
 
-    def act(self, sensed: Sensed) -> Velocity:
-        """Take a tick: hear, go on with the step under way or begin the next one, and drive."""
-        self._pace.hears(sensed.heard)
+    def act(
+        self, time: float, pose: Pose, ahead: float | None, heard: Sequence[Notice]
+    ) -> Velocity:
+        """Take a tick: hear, go on with the step under way or begin the next one, and drive.
+
+        ``time`` are seconds since the start, ``pose`` is where it believes to be.  ``ahead`` is how
+        far from its middle the lidar sees the first thing in its way, in metres: infinite where
+        there is none, None where it did not look.  ``heard`` are the messages of the tick before.
+        """
+        self._pace.hears(heard)
         if isinstance(self._monitor, EventMonitor):
-            self._hear_of_events(self._monitor, sensed.heard)
+            self._hear_of_events(self._monitor, heard)
         if not self._is_underway:
-            self._heed_wishes(sensed)
-            if not self._begins(sensed.time):
+            self._heed_wishes()
+            if not self._begins(time):
                 return STANDING
         step = self.steps[-1]
         if step.place is None:
-            has_ended = self._pace.is_common or sensed.time >= step.begin + self._pace.period
+            has_ended = self._pace.is_common or time >= step.begin + self._pace.period
         else:
-            has_ended = math.dist(sensed.pose[:2], self._points[step.place]) < _ARRIVED
+            has_ended = math.dist(pose[:2], self._points[step.place]) < _ARRIVED
         if has_ended:
-            self._finish(step, sensed.time)
+            self._finish(step, time)
         if has_ended or step.place is None:
             return STANDING
-        return self._driven(self._points[step.place], step, sensed)
+        return self._driven(self._points[step.place], time - step.begin, pose, ahead)
 
     def _begins(self, time: float) -> bool:
         """Begin the next step now, if there is one and nothing keeps it back."""
@@ -274,9 +251,9 @@ class Robot:
         self._messages, self._events = [], []
         return told
 
-    def _heed_wishes(self, sensed: Sensed) -> None:
-        """Commit to what is wanted, where its choices allow it."""
-        for atom in sensed.wanted:
+    def _heed_wishes(self) -> None:
+        """Commit to what is wanted from now on, where its choices allow it."""
+        for atom in () if self._monitor.finished else self._wishes.pop(self.done, ()):
             granted = bool(self._monitor.can(visit=atom))
             if granted:
                 self._monitor.commit(visit=atom)
@@ -331,8 +308,8 @@ class Robot:
     def _finish(self, step: OwnStep, time: float) -> None:
         before, words = self.words, None
         if self._own_words is not None:
-            self._word_state = self._own_words.moves[self._word_state][step.subaction or IDLE]
-            words = self.words = max(before, self._own_words.words[self._word_state])
+            words = self._own_words([own.subaction for own in self.steps])
+            self.words = words = max(before, words)
         self.steps[-1] = replace(step, end=time, words=words)
         self.done += 1
         if isinstance(self._monitor, EventMonitor):
@@ -344,22 +321,24 @@ class Robot:
             if kind == "word":
                 self._events.append(("word", {}))
 
-    def _driven(self, target: tuple[float, float], step: OwnStep, sensed: Sensed) -> Velocity:
+    def _driven(
+        self, target: tuple[float, float], since: float, pose: Pose, sees: float | None
+    ) -> Velocity:
         """Turn on the spot, then drive, steering; slower where it is near or not straight ahead.
 
-        Where all begin together, all drive off together.
+        Where all begin together, all drive off together, so many seconds ``since`` they began.
         """
-        x, y, heading = sensed.pose
+        x, y, heading = pose
         angle = math.remainder(math.atan2(target[1] - y, target[0] - x) - heading, 2 * math.pi)
         turn = max(-TURN, min(TURN, _GAIN * angle))
         if self._is_turning:
-            waits = self._pace.is_common and sensed.time - step.begin < _TURNING
+            waits = self._pace.is_common and since < _TURNING
             if waits or abs(angle) >= _ALIGNED:
                 return 0.0, turn
             self._is_turning = False
-        if sensed.ahead is None:
+        if sees is None:
             return STANDING
-        room = (sensed.ahead - (self._radius + 0.03)) / _REACTION
+        room = (sees - (self._radius + 0.03)) / _REACTION
         if room <= 0 and self._stopped_in != self.done:
             self._stopped_in = self.done
             self._events.append(("stopped", {}))

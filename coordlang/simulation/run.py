@@ -20,7 +20,7 @@ from coordlang.simulation.record import (
     StepRecord,
     WishRecord,
 )
-from coordlang.simulation.robot import TICK, Notice, Pace, Pose, Robot, Sensed, period
+from coordlang.simulation.robot import TICK, Notice, Pace, Pose, Robot, period
 from coordlang.simulation.simulator import POSITION_NOISE, WALL, Floor, Settings, Simulator
 from coordlang.simulation.team import Mission
 
@@ -94,6 +94,9 @@ class _Going:
     ) -> None:
         self.mission, self.settings, self.seed = mission, settings, seed
         self.period = period(floor.longest)
+        wished: dict[str, dict[int, list[str]]] = {name: {} for name in mission.robots}
+        for wish in wishes:
+            wished[wish.robot].setdefault(wish.step, []).append(wish.visit)
         self.robots = {
             name: Robot(
                 name,
@@ -103,11 +106,11 @@ class _Going:
                 *given,
                 Pace(settings.step, mission.robots, self.period),
                 Random(f"{seed} choices {name}"),
+                wished[name],
             )
             for name, given in mission.team(seed).items()
         }
         self.sensing = {name: Random(f"{seed} sensors {name}") for name in self.robots}
-        self.wishes = list(wishes)
         poses = {}
         for name, place in mission.starts.items():
             heading = Random(f"{seed} heading {name}").uniform(-math.pi, math.pi)
@@ -138,7 +141,7 @@ class _Going:
         heard, self.heard = self.heard, ()
         velocities = {}
         for name, robot in self.robots.items():
-            velocities[name] = robot.act(self._sensed(name, robot, heard))
+            velocities[name] = robot.act(self.time, *self._sensed(name, robot), heard)
             messages, events = robot.told()
             self.heard += (*messages,)
             self.messages += len(messages)
@@ -186,20 +189,13 @@ class _Going:
             poses=self.poses,
         )
 
-    def _sensed(self, name: str, robot: Robot, heard: tuple[Notice, ...]) -> Sensed:
+    def _sensed(self, name: str, robot: Robot) -> tuple[Pose, float | None]:
         spread, random = POSITION_NOISE * self.settings.noise, self.sensing[name]
         x, y, heading = (value + random.gauss(0, spread) for value in self.simulator.pose(name))
         ahead: float | None = math.inf
         if self.settings.lidar:
             ahead = self.simulator.ahead(name) if robot.looks_ahead else None
-        wanted = self._wanted(robot) if robot.chooses_next else ()
-        return Sensed(self.time, (x, y, heading), ahead, heard, wanted)
-
-    def _wanted(self, robot: Robot) -> tuple[str, ...]:
-        """What a robot has come to want by now, and was not told yet."""
-        own = [one for one in self.wishes if one.robot == robot.name and one.step <= robot.done]
-        self.wishes = [one for one in self.wishes if one not in own]
-        return tuple(wish.visit for wish in own)
+        return (x, y, heading), ahead
 
     def _see_collisions(self) -> None:
         touching = self.simulator.touching()

@@ -7,7 +7,6 @@ For comparison all robots follow one whole plan, or each an optimal plan of its 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 from itertools import combinations
 from random import Random
 from typing import Literal
@@ -165,9 +164,15 @@ def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWo
     # As many bits as words are passed before: the most of them is what is possibly true.
     passed = [(1 << number - 1) - 1 for number in words_passed(fits, word).tolist()]
     found = determinise(fits, robot, passed)
-    text = partial(fits.model.label_text, robot)
-    moves = [{text(label) or IDLE: to for label, to in own.items()} for own in found.moves]
-    return OwnWords(moves, [known.possible.bit_length() for known in found.known])
+    texts = fits.model.labels[robot]
+
+    def passed_after(subactions: Sequence[str | None]) -> int:
+        state = 0
+        for text in subactions:
+            state = found.moves[state][texts.index(text or IDLE)]
+        return found.known[state].possible.bit_length()
+
+    return passed_after
 
 
 def _note_what_is_left_out(
