@@ -58,44 +58,35 @@ def plan_under_sentence(
     slack the earliest is read off the plan space, without a search, and of plans without a common
     step the first one.  Raises `NoPlanFits`.
     """
-    space, start = task_language.space, task_language.start
-    fits = space if words is None else task_language.plans_with(words)  # raises if there is none
-    begin = start if words is None else int(fits.starts[0])
+    space, task = task_language.space, task_language.task
+    if words is not None:
+        space, task = task_language.plans_with(words), 0  # raises if there is none
     if space.model.slack:
-        return _read_off(task_language, fits, begin, _earliest(fits, begin))
+        return _read_off(task_language, _earliest(space), task)
     if space.model.is_asynchronous:
-        return _read_off(task_language, fits, begin, fits.first_path(begin))
+        return _read_off(task_language, space, task)
     found = _a_star(_States(task_language, words, bound), words, count_words)
-    assert found.cost == space.cost_of(task_language.task), "A* is optimal"
+    assert found.cost == space.cost_of(task), "A* is optimal"
     return found
 
 
-def _read_off(
-    task_language: TaskLanguage, space: PlanSpace, start: int, path: Sequence[int]
-) -> GuidedPlan:
-    """The plan of a path in a plan space, without a search."""
+def _read_off(task_language: TaskLanguage, space: PlanSpace, task: int) -> GuidedPlan:
+    """The first plan of a task in a plan space, without a search."""
+    start = int(space.starts[task])
+    path = space.first_path(start)
     passed = task_language.partition.word_of(space.rows)[space.state[space.nodes_on(start, path)]]
     steps = Plans(space, start, []).steps(tuple(map(space.labels_of, path)))
-    cost = len(steps), int(space.cost[list(path)].sum())
+    cost = len(steps), int(space.cost[path].sum())
     return GuidedPlan(steps, sentence(passed.tolist()), cost, 0, 0, 0)
 
 
-def _earliest(space: PlanSpace, start: int) -> list[int]:
-    """The path of the plan within slack that rests soonest, the first of these in their order."""
-    resting = rests(space.labels)
-    # Per node the steps until a rest that lasts to the end; per edge those with it.
-    left = np.zeros(len(space), np.int64)
-    through = np.zeros(len(resting), np.int64)
+def _earliest(space: PlanSpace) -> PlanSpace:
+    """The plans within slack that rest soonest, and then to the end."""
+    resting, can_rest = rests(space.labels), space.layer == 0
     for edges in space.edges_by_layer():
-        after = left[edges.target]
-        through[edges.edges] = np.where(resting[edges.edges] & (after == 0), 0, 1 + after)
-        left[edges.source] = np.iinfo(np.int64).max
-        np.minimum.at(left, edges.source, through[edges.edges])
-    path, node = list[int](), start
-    while space.layer[node] > 0:
-        path.append(next(e for e in space.out_edges(node) if through[e] == left[node]))
-        node = space.target_of(path[-1])
-    return path
+        resting[edges.edges] &= can_rest[edges.target]
+        can_rest[edges.source[resting[edges.edges]]] = True
+    return space.cheapest((~resting).astype(np.int64))
 
 
 def _a_star(states: _States, words: Sequence[int] | None, count_words: bool) -> GuidedPlan:

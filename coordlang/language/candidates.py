@@ -25,7 +25,7 @@ from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import as_executed
 from planners.search.goals import searched
 from planners.search.kept_plans import search
-from planners.search.optimal_plans import joined, plan_spaces, solvable
+from planners.search.optimal_plans import distances_to, joined, solvable
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import Explored, Searched, Source
 from planners.search.reachable import Exploration, Space, explore
@@ -123,13 +123,9 @@ def all_pairs(
     forgetting = replace(model.without_slack, codec=replace(model.codec, memory=None))
     base = explore(forgetting, model.codec.facts_part(inits))
     starts = np.hstack((base.rows, np.zeros((len(base), len(model.robots)), np.uint64)))
-    groups: list[tuple[Goal, Rows | None]] = []
-    for plans in plan_spaces(base, _to_each_state(base)):
-        goal_of_task, state = plans.goal[plans.starts], plans.state[plans.starts]
-        for number, goal in enumerate(plans.goals):
-            mine = state[goal_of_task == number]
-            if len(mine):
-                groups.append((goal, starts[mine]))
+    goals = [goal for goal, _ in _to_each_state(base)]
+    far = zip(goals, distances_to(base, goals), strict=True)
+    groups = [(goal, starts[steps > 0]) for goal, steps in far if (steps > 0).any()]
     return Candidates("all", loaded, Explored(explore(model, starts), groups), len(base))
 
 
