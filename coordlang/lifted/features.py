@@ -59,7 +59,21 @@ class Expression:
 
     @property
     def complexity(self) -> int:
-        """How much there is to say: one for each head and each name."""
+        """How much there is to say: one for each head and each name, and more for numbers.
+
+        What is large in small problems is nothing, so a most counts twice.
+        """
+        match self:
+            case Role(closure=further) | Term(inverse=further):
+                return 1 + further
+            case Count(args=args):
+                return 1 + len(args) - args.count(ANY)
+            case Residue(number, modulus):
+                return number.complexity + modulus
+            case Least(number, most):
+                return number.complexity + 2 * most
+            case Some(role, concept):
+                return role.complexity + concept.complexity
         return 1 + sum(part.complexity for part in self.parts if isinstance(part, Expression))
 
     def __call__(self, states: States) -> Any:
@@ -81,11 +95,6 @@ class Role(Expression):
     def __str__(self) -> str:
         text = f"(inverse {self.predicate})" if self.inverse else self.predicate
         return f"(closure {text})" if self.closure else text
-
-    @property
-    def complexity(self) -> int:
-        """One, and one more for any number of steps."""
-        return 1 + self.closure
 
     def some(self, states: States, members: Bools) -> Bools:
         """The objects that the role relates with one of ``members``: (states, objects)."""
@@ -188,11 +197,6 @@ class Some(Expression):
     role: Role
     concept: Concept
 
-    @property
-    def complexity(self) -> int:
-        """That of its parts."""
-        return self.role.complexity + self.concept.complexity
-
     def __call__(self, states: States) -> Bools:
         return self.role.some(states, states.get(self.concept))
 
@@ -213,11 +217,6 @@ class Term(Expression):
 
     def __str__(self) -> str:
         return f"({'inverse ' * self.inverse}{self.predicate} {self.named})"
-
-    @property
-    def complexity(self) -> int:
-        """One, and one more for the other direction."""
-        return 1 + self.inverse
 
     def __call__(self, states: States) -> Ints:
         return states.image(self.predicate, self.named, self.inverse)
@@ -264,11 +263,6 @@ class Count(Expression):
 
     def __str__(self) -> str:
         return f"(count {' '.join((self.predicate, *self.args))})"
-
-    @property
-    def complexity(self) -> int:
-        """One, and one more for each object that is named."""
-        return 1 + sum(arg != ANY for arg in self.args)
 
     def __call__(self, states: States) -> Ints:
         return states.count(self.predicate, self.args)
@@ -348,11 +342,6 @@ class Residue(Expression):
     number: Number
     modulus: int
 
-    @property
-    def complexity(self) -> int:
-        """That of the number, and the modulus."""
-        return self.number.complexity + self.modulus
-
     def __call__(self, states: States) -> Ints:
         number = states.get(self.number)
         return _defined(number % self.modulus, number)
@@ -366,11 +355,6 @@ class Least(Expression):
     FORMS = ("min({}, {})", "{0}, where {1} stands for {1} or more")
     number: Number
     most: int
-
-    @property
-    def complexity(self) -> int:
-        """That of the number, and twice the most: what is large in small problems is nothing."""
-        return self.number.complexity + 2 * self.most
 
     def __call__(self, states: States) -> Ints:
         number = states.get(self.number)

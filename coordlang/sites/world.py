@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import permutations, product
 
 from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel, show
@@ -130,19 +130,15 @@ def _without_ambiguous(
         for atom, role in map(roles.__getitem__, roles.keys() & state):
             said[role[1]].append(atom.predicate)
         for thing, predicates in said.items():
-            ambiguous |= {(thing, predicate) for predicate in _vague(predicates, located)}
+            first, *further = sorted(predicates, key=located.__getitem__, reverse=True)
+            if further and located[first] == located[further[0]]:
+                further.append(first)
+            ambiguous.update(product([thing], further))
     return {
         text: role
         for text, (atom, role) in roles.items()
         if (role[1], atom.predicate) not in ambiguous
     }
-
-
-def _vague(predicates: Sequence[str], located: Mapping[str, int]) -> set[str]:
-    """The predicates of a thing's atoms in a state, without one that locates more than all."""
-    most = max(located[predicate] for predicate in predicates)
-    best = [predicate for predicate in predicates if located[predicate] == most]
-    return set(predicates).difference(best if len(best) == 1 else ())
 
 
 def _other_role(atom: Atom, places: frozenset[str], things: set[str]) -> Role:
