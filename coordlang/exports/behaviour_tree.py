@@ -37,13 +37,10 @@ class _Leaf(NamedTuple):
     does: str
 
 
-#: Where robots step together, where they do not, and in both.
-_STEP_LEAVES = {
+_LEAVES = {
     "AwaitStep": _Leaf(
         "Action", ("step",), "is running until this joint step begins; steps count from 0"
-    )
-}
-_EVENT_LEAVES = {
+    ),
     "AwaitEnded": _Leaf(
         "Action",
         ("robot", "count", "subaction"),
@@ -55,12 +52,9 @@ _EVENT_LEAVES = {
         "says that the own robot is ready for the subaction, and is running until the other one is "
         "for what it does",
     ),
-}
-_LEAVES = {
     "Chooses": _Leaf("Condition", ("subaction",), "succeeds if the robot wants to do this now"),
     "Holds": _Leaf("Condition", ("fact",), "succeeds if this fact is true now"),
 }
-
 
 #: What a robot may do in a state of its automaton: the state, a label, and the state after it.
 _Move = tuple[int, int, int]
@@ -80,7 +74,7 @@ def behaviour_trees(choices: SentenceChoices) -> str:
     root = ET.Element("root", BTCPP_format="4")
     root.append(ET.Comment(_comment(choices)))
     root.extend(_tree(model, own) for own in choices.robots)
-    root.append(_models(model, choices))
+    root.append(_models(root, _leaves(model)))
     _set_ids(root, model)
     ET.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
@@ -105,7 +99,8 @@ def _comment(choices: SentenceChoices) -> str:
 
 
 def _leaves(model: JointModel) -> Mapping[str, _Leaf]:
-    return (_EVENT_LEAVES if model.is_asynchronous else _STEP_LEAVES) | _LEAVES
+    left_out = ("AwaitStep",) if model.is_asynchronous else ("AwaitEnded", "AwaitPartner")
+    return {name: leaf for name, leaf in _LEAVES.items() if name not in left_out}
 
 
 def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
@@ -192,19 +187,16 @@ def _action(text: str) -> ET.Element:
     return _leaf(name, subaction=text, **ports)
 
 
-def _models(model: JointModel, choices: SentenceChoices) -> ET.Element:
+def _models(trees: ET.Element, leaves: Mapping[str, _Leaf]) -> ET.Element:
     """The ports of all leaves, which editors of trees ask for."""
     found = ET.Element("TreeNodesModel")
-    found.extend(_leaf_model(one.kind, name, one.ports) for name, one in _leaves(model).items())
-    ports: dict[str, int] = {}
-    for own in choices.robots:
-        for label in sorted(own.automaton.labels):
-            if (text := model.subaction_text(own.robot, label)) is not None:
-                name, *arguments = text.strip("()").split()
-                ports[name] = max(ports.get(name, 0), len(arguments))
-    for name, number in sorted(ports.items()):
-        own_ports = ["subaction", *(f"arg{n}" for n in range(number))]
-        found.append(_leaf_model("Action", name, own_ports))
+    found.extend(_leaf_model(one.kind, name, one.ports) for name, one in leaves.items())
+    ports: dict[str, list[str]] = {}
+    for action in trees.iter("Action"):
+        (_, name), *given = action.items()
+        ports[name] = max(ports.get(name, []), [port for port, _ in given], key=len)
+    for name in sorted(ports.keys() - leaves.keys()):
+        found.append(_leaf_model("Action", name, ports[name]))
     return found
 
 
