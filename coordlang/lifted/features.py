@@ -30,7 +30,7 @@ from typing import Any, ClassVar, get_args
 
 import numpy as np
 
-from coordlang.lifted.world import ANY, NONE, States, attribute, distances, links
+from coordlang.lifted.world import ANY, NONE, States, attribute, distances, links, true_atoms
 from planners.joint.tables import Bools, Ints
 from planners.pddl.sexpr import Group, Source, Token, parse
 from planners.system.errors import BadInput, Position
@@ -112,7 +112,7 @@ class Role(Expression):
             linked = world.get(links, self.predicate).astype(np.float32)
             return members.astype(np.float32) @ (linked if self.inverse else linked.T) > 0
         found = np.zeros_like(members)
-        state, *ends = states.atoms(self.predicate, 2)
+        state, *ends = states.get(true_atoms, self.predicate, 2)
         one, other = reversed(ends) if self.inverse else ends
         hit = members[state, other]
         found[state[hit], one[hit]] = True
@@ -146,7 +146,7 @@ class Named(Expression):
         world = states.world
         found = np.zeros((len(states), len(world.objects)), bool)
         found[:, [world.number[name] for name in world.types.get(self.name, ())]] = True
-        found[states.atoms(self.name, 1)] = True
+        found[states.get(true_atoms, self.name, 1)] = True
         return found
 
 
@@ -209,7 +209,10 @@ Concept = Everything | Named | One | Without | Both | Some
 
 @dataclass(frozen=True, slots=True)
 class Term(Expression):
-    """The object that a fact of a predicate relates a named object with; `NONE`: there is none."""
+    """The object x with (predicate named x), or (predicate x named) if inverse.
+
+    `NONE` where there is none; of several the first by name.
+    """
 
     predicate: str
     named: str
@@ -219,7 +222,13 @@ class Term(Expression):
         return f"({'inverse ' * self.inverse}{self.predicate} {self.named})"
 
     def __call__(self, states: States) -> Ints:
-        return states.image(self.predicate, self.named, self.inverse)
+        none = len(states.world.objects)
+        found = np.full(len(states), none)
+        state, *ends = states.get(true_atoms, self.predicate, 2)
+        mine, other = reversed(ends) if self.inverse else ends
+        hit = mine == states.world.number.get(self.named, NONE)
+        np.minimum.at(found, state[hit], other[hit])
+        return np.where(found == none, NONE, found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +274,12 @@ class Count(Expression):
         return f"(count {' '.join((self.predicate, *self.args))})"
 
     def __call__(self, states: States) -> Ints:
-        return states.count(self.predicate, self.args)
+        state, *own = states.get(true_atoms, self.predicate, len(self.args))
+        hit = np.ones(len(state), bool)
+        for wanted, names in zip(self.args, own, strict=True):
+            if wanted != ANY:
+                hit &= names == states.world.number.get(wanted, NONE)
+        return np.bincount(state[hit], minlength=len(states))
 
 
 @dataclass(frozen=True, slots=True)

@@ -112,38 +112,12 @@ class States(Asked):
         """The true facts of each state."""
         return TrueFacts(self.world.model.codec.facts_part(self.rows))
 
-    def atoms(self, predicate: str, arity: int) -> tuple[Ints, ...]:
-        """The true atoms of a predicate with so many arguments: their states, then the arguments.
 
-        All arrays, of numbers, are as long as there are such atoms in all states together.
-        """
-        return self.get(_atoms, predicate, arity)
+def true_atoms(states: States, predicate: str, arity: int) -> tuple[Ints, ...]:
+    """The true atoms of a predicate with so many arguments: their states, then the arguments.
 
-    def image(self, predicate: str, named: str, inverse: bool) -> Ints:
-        """In each state the object x with (predicate named x), or (predicate x named) if inverse.
-
-        `NONE` where there is none; of several the first by name.
-        """
-        count = len(self.world.objects)
-        found = np.full(len(self), count)
-        if named in self.world.number:
-            state, *ends = self.atoms(predicate, 2)
-            mine, other = reversed(ends) if inverse else ends
-            hit = mine == self.world.number[named]
-            np.minimum.at(found, state[hit], other[hit])
-        return np.where(found == count, NONE, found)
-
-    def count(self, predicate: str, args: Sequence[str]) -> Ints:
-        """Per state the number of true atoms of a predicate with these arguments, or `ANY`."""
-        state, *own = self.atoms(predicate, len(args))
-        hit = np.ones(len(state), bool)
-        for wanted, names in zip(args, own, strict=True):
-            if wanted != ANY:
-                hit &= names == self.world.number.get(wanted, NONE)
-        return np.bincount(state[hit], minlength=len(self))
-
-
-def _atoms(states: States, predicate: str, arity: int) -> tuple[Ints, ...]:
+    All arrays, of numbers, are as long as there are such atoms in all states together.
+    """
     world, atoms = states.world, states.world.model.codec.facts.atoms
     found = [args for args in world.statics.get(predicate, ()) if len(args) == arity]
     if found:
