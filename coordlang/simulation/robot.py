@@ -96,6 +96,9 @@ Pose = tuple[float, float, float]
 #: Metres a second ahead, radians a second to the left.
 Velocity = tuple[float, float]
 
+#: Metres from a robot's middle to the first thing in its way; infinite where there is none.
+Look = Callable[[], float]
+
 #: What is worth recording: the kind of a `coordlang.simulation.record.EventRecord`, and further
 #: fields of it.
 Event = tuple[str, Mapping[str, object]]
@@ -183,11 +186,6 @@ class Robot:
         """Whether all own steps are done."""
         return self._monitor.finished and not self._is_underway
 
-    @property
-    def looks_ahead(self) -> bool:
-        """Whether it drives, and has to be told what is in its way."""
-        return self._is_underway and self.steps[-1].place is not None and not self._is_turning
-
     def subplan(self) -> list[str | None]:
         """What it chose, and would choose in the steps that it has not begun."""
         ahead, random = self._monitor.copy(), Random()
@@ -203,14 +201,11 @@ class Robot:
             ahead = ahead.after(chosen[-1])
         return chosen
 
-    def act(
-        self, time: float, pose: Pose, ahead: float | None, heard: Sequence[Notice]
-    ) -> Velocity:
+    def act(self, time: float, pose: Pose, look: Look | None, heard: Sequence[Notice]) -> Velocity:
         """Take a tick: hear, go on with the step under way or begin the next one, and drive.
 
-        ``time`` are seconds since the start, ``pose`` is where it believes to be.  ``ahead`` is how
-        far from its middle the lidar sees the first thing in its way, in metres: infinite where
-        there is none, None where it did not look.  ``heard`` are the messages of the tick before.
+        ``time`` are seconds since the start, ``pose`` is where it believes to be; it has a lidar to
+        ``look`` ahead with, or none.  ``heard`` are the messages of the tick before.
         """
         self._pace.hears(heard)
         if isinstance(self._monitor, EventMonitor):
@@ -228,7 +223,7 @@ class Robot:
             self._finish(step, time)
         if has_ended or step.place is None:
             return STANDING
-        return self._driven(self._points[step.place], time - step.begin, pose, ahead)
+        return self._driven(self._points[step.place], time - step.begin, pose, look)
 
     def _begins(self, time: float) -> bool:
         """Begin the next step now, if there is one and nothing keeps it back."""
@@ -322,7 +317,7 @@ class Robot:
                 self._events.append(("word", {}))
 
     def _driven(
-        self, target: tuple[float, float], since: float, pose: Pose, sees: float | None
+        self, target: tuple[float, float], since: float, pose: Pose, look: Look | None
     ) -> Velocity:
         """Turn on the spot, then drive, steering; slower where it is near or not straight ahead.
 
@@ -336,9 +331,9 @@ class Robot:
             if waits or abs(angle) >= _ALIGNED:
                 return 0.0, turn
             self._is_turning = False
-        if sees is None:
-            return STANDING
-        room = (sees - (self._radius + 0.03)) / _REACTION
+            if look is not None:  # it looks while it drives
+                return STANDING
+        room = ((look() if look else math.inf) - (self._radius + 0.03)) / _REACTION
         if room <= 0 and self._stopped_in != self.done:
             self._stopped_in = self.done
             self._events.append(("stopped", {}))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, astuple
+from functools import partial
 from itertools import combinations
 from random import Random
 from typing import Any
@@ -141,7 +142,8 @@ class _Going:
         heard, self.heard = self.heard, ()
         velocities = {}
         for name, robot in self.robots.items():
-            velocities[name] = robot.act(self.time, *self._sensed(name, robot), heard)
+            look = partial(self.simulator.ahead, name) if self.settings.lidar else None
+            velocities[name] = robot.act(self.time, self._believed(name), look, heard)
             messages, events = robot.told()
             self.heard += (*messages,)
             self.messages += len(messages)
@@ -189,13 +191,10 @@ class _Going:
             poses=self.poses,
         )
 
-    def _sensed(self, name: str, robot: Robot) -> tuple[Pose, float | None]:
+    def _believed(self, name: str) -> Pose:
         spread, random = POSITION_NOISE * self.settings.noise, self.sensing[name]
         x, y, heading = (value + random.gauss(0, spread) for value in self.simulator.pose(name))
-        ahead: float | None = math.inf
-        if self.settings.lidar:
-            ahead = self.simulator.ahead(name) if robot.looks_ahead else None
-        return (x, y, heading), ahead
+        return x, y, heading
 
     def _see_collisions(self) -> None:
         touching = self.simulator.touching()

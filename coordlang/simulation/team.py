@@ -206,11 +206,10 @@ def _note_what_is_left_out(
 
 def _leads(world: World, space: PlanSpace, robot: int) -> dict[str, str]:
     """The place to which each of a robot's subactions on the plans leads, by its text."""
-    model = space.model
-    found = {}
-    for label in sorted(set(space.robot_labels(robot).tolist())):
-        text = model.label_text(robot, label)
-        for thing, place in world.moves(model, robot, label):
-            if text is not None and thing == model.robots[robot]:
-                found[text] = place
-    return found
+    model, labels = space.model, set(space.robot_labels(robot).tolist())
+    return {
+        model.labels[robot][label]: place
+        for label in sorted(labels)
+        for thing, place in world.moves(model, robot, label)
+        if thing == model.robots[robot]
+    }
