@@ -62,22 +62,17 @@ def plan_under_sentence(
     if words is not None:
         space, task = task_language.plans_with(words), 0  # raises if there is none
     if space.model.slack:
-        return _read_off(task_language, _earliest(space), task)
-    if space.model.is_asynchronous:
-        return _read_off(task_language, space, task)
-    found = _a_star(_States(task_language, words, bound), words, count_words)
-    assert found.cost == space.cost_of(task), "A* is optimal"
-    return found
-
-
-def _read_off(task_language: TaskLanguage, space: PlanSpace, task: int) -> GuidedPlan:
-    """The first plan of a task in a plan space, without a search."""
-    start = int(space.starts[task])
-    path = space.first_path(start)
+        space = _earliest(space)
+    start, work = int(space.starts[task]), (0, 0, 0)
+    path: list[int] | None = space.first_path(start)
+    if not (space.model.slack or space.model.is_asynchronous):
+        plan, work = _a_star(_States(task_language, words, bound), words, count_words)
+        path = space.path_with(start, plan)
+    assert path is not None, "A* is optimal"
     passed = task_language.partition.word_of(space.rows)[space.state[space.nodes_on(start, path)]]
     steps = Plans(space, start, []).steps(tuple(map(space.labels_of, path)))
     cost = len(steps), int(space.cost[path].sum())
-    return GuidedPlan(steps, sentence(passed.tolist()), cost, 0, 0, 0)
+    return GuidedPlan(steps, sentence(passed.tolist()), cost, *work)
 
 
 def _earliest(space: PlanSpace) -> PlanSpace:
@@ -89,8 +84,10 @@ def _earliest(space: PlanSpace) -> PlanSpace:
     return space.cheapest((~resting).astype(np.int64))
 
 
-def _a_star(states: _States, words: Sequence[int] | None, count_words: bool) -> GuidedPlan:
-    """Search for an optimal plan with a sentence that some optimal plan has.
+def _a_star(
+    states: _States, words: Sequence[int] | None, count_words: bool
+) -> tuple[Plan, tuple[int, int, int]]:
+    """Search for an optimal plan with a sentence that some optimal plan has; also tell the work.
 
     A node is a state, the *index* of its word in the sentence (0 without a sentence) and a cost.
     What does not fit is pruned: a step stays in its word or goes on to the next one, and a goal
@@ -122,7 +119,7 @@ def _a_star(states: _States, words: Sequence[int] | None, count_words: bool) -> 
         if cost != best[state]:
             continue
         if index == last and states.height[state] == 0:
-            return _found(states, ways, node, expanded)
+            return _plan(ways, node), (len(expanded), len({*expanded}), len(ways) + 1)
         expanded.append(state)
         for order, to, labels in states.steps(node):
             if to not in ways and to[2] <= best.get(to[0], to[2]):
@@ -175,13 +172,10 @@ class _States:
                 yield number, to, tuple(found.labels[number].tolist())
 
 
-def _found(states: _States, ways: Ways, node: Node, expanded: Sequence[int]) -> GuidedPlan:
-    cost, plan, passed = node[2], [], [node[0]]
+def _plan(ways: Ways, node: Node) -> Plan:
+    """The steps that led to a node."""
+    plan = []
     while node in ways:
         node, labels = ways[node]
         plan.append(labels)
-        passed.append(node[0])
-    rows = np.stack([states.rows[state] for state in reversed(passed)])
-    words = sentence(states.partition.word_of(rows).tolist())
-    work = len(expanded), len({*expanded}), len(ways) + 1
-    return GuidedPlan(tuple(reversed(plan)), words, cost, *work)
+    return tuple(reversed(plan))

@@ -13,9 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from coordlang.execution.automaton import determinise
 from coordlang.execution.choices import choices, knowing_own, monitor
-from coordlang.execution.monitor import IDLE, Monitor
+from coordlang.execution.monitor import Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
 from coordlang.simulation.robot import SPEED, TICK, OwnWords
@@ -161,16 +160,15 @@ def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWo
     if fits.model.is_asynchronous:
         return None
     word = task_language.partition.word_of(fits.rows)[fits.state]
-    # As many bits as words are passed before: the most of them is what is possibly true.
-    passed = [(1 << number - 1) - 1 for number in words_passed(fits, word).tolist()]
-    found = determinise(fits, robot, passed)
-    texts = fits.model.labels[robot]
+    passed, labels = words_passed(fits, word), fits.robot_labels(robot)
 
     def passed_after(subactions: Sequence[str | None]) -> int:
-        state = 0
+        nodes = fits.starts
         for text in subactions:
-            state = found.moves[state][texts.index(text or IDLE)]
-        return found.known[state].possible.bit_length()
+            _, edges = fits.edges_from(nodes)
+            own = labels[edges] == fits.model.label_number(robot, text)
+            nodes = np.unique(fits.targets(edges[own]))
+        return int(passed[nodes].max()) - 1
 
     return passed_after
 
