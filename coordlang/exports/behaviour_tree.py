@@ -22,7 +22,7 @@ from xml.etree import ElementTree as ET
 
 from coordlang.execution.choices import RobotChoices, SentenceChoices
 from planners.grounding.actions import GroundAction
-from planners.joint.model import IDLE, JointModel
+from planners.joint.model import JointModel
 from planners.joint.states import bits
 from planners.search.goals import goal_facts
 from planners.system.errors import UsageError
@@ -55,9 +55,6 @@ _LEAVES = {
     "Chooses": _Leaf("Condition", ("subaction",), "succeeds if the robot wants to do this now"),
     "Holds": _Leaf("Condition", ("fact",), "succeeds if this fact is true now"),
 }
-
-#: What a robot may do in a state of its automaton: the state, a label, and the state after it.
-_Move = tuple[int, int, int]
 
 #: What BehaviorTree.CPP refuses in an ID.
 _FORBIDDEN = re.compile(r"""[<>&"'/\\:*?|.]""")
@@ -114,41 +111,32 @@ def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
         if own.robot in action.owners and not action.parts
     }
     for step, states in enumerate(own.automaton.layers[:-1]):
-        moves = [(state, *move) for state in states for move in own.automaton.moves[state].items()]
         here = ET.SubElement(steps, "Sequence", name=f"{model.unit} {step}")
         if not model.is_asynchronous:
             here.append(_leaf("AwaitStep", step=str(step)))
-        here.append(_choosing(model, own, moves))
-        here.append(_acting(model, own, moves, actions))
+        here.extend(_branches(model, own, states, actions))
     return tree
 
 
-def _choosing(model: JointModel, own: RobotChoices, moves: Sequence[_Move]) -> ET.Element:
-    """Choose a move of the present state: the first that is wanted, else the last.
+def _branches(
+    model: JointModel, own: RobotChoices, states: range, actions: Mapping[str, GroundAction]
+) -> tuple[ET.Element, ET.Element]:
+    """What chooses a move of the present state, and what does it.
 
-    Nothing is done here, so that an action that fails is never followed by another choice.
+    The first one that is wanted, else the last.  Where it is chosen nothing is done, so that an
+    action that fails is never followed by another choice.  Of what does moves only its own branch
+    can succeed.
     """
-    choose = ET.Element("Fallback", name="choose")
-    last = {state: number for number, (state, *_) in enumerate(moves)}
-    for number, (state, label, _) in enumerate(moves):
+    choose, act = ET.Element("Fallback", name="choose"), ET.Element("Fallback", name="act")
+    moves = [(state, *move) for state in states for move in own.automaton.moves[state].items()]
+    last = {state: label for state, label, _ in moves}
+    for number, (state, label, target) in enumerate(moves):
         branch = ET.SubElement(choose, "Sequence")
         ET.SubElement(branch, "ScriptCondition", code=f"state == {state}")
-        if last[state] != number:
-            text = model.label_text(own.robot, label) or IDLE
-            ET.SubElement(branch, "Condition", ID="Chooses", subaction=text)
+        if last[state] != label:
+            wanted = model.labels[own.robot][label]
+            ET.SubElement(branch, "Condition", ID="Chooses", subaction=wanted)
         ET.SubElement(branch, "Script", code=f"move := {number}")
-    return choose
-
-
-def _acting(
-    model: JointModel,
-    own: RobotChoices,
-    moves: Sequence[_Move],
-    actions: Mapping[str, GroundAction],
-) -> ET.Element:
-    """Do the chosen move: of the branches only its own can succeed."""
-    act = ET.Element("Fallback", name="act")
-    for number, (state, label, target) in enumerate(moves):
         branch = ET.SubElement(act, "Sequence")
         ET.SubElement(branch, "ScriptCondition", code=f"move == {number}")
         text = model.subaction_text(own.robot, label)
@@ -160,7 +148,7 @@ def _acting(
                 ET.SubElement(branch, "Condition", ID="Holds", fact=model.codec.facts.texts[fact])
             branch.append(_action(text))
         ET.SubElement(branch, "Script", code=f"state := {target}")
-    return act
+    return choose, act
 
 
 def _awaiting(model: JointModel, robot: int, label: int, text: str) -> Iterator[ET.Element]:
