@@ -35,17 +35,12 @@ from planners.system.limits import reaching
 class Knowledge(NamedTuple):
     """What a robot knows in a state, whatever the others do.
 
-    ``true`` are the facts that are certainly true, ``possible`` those that are possibly true, as
+    ``true`` are the facts that are certainly true, ``unknown`` those that may be true or false, as
     sets of bits: fact k is bit k.
     """
 
     true: int
-    possible: int
-
-    @property
-    def unknown(self) -> int:
-        """The facts that may be true or false."""
-        return self.possible & ~self.true
+    unknown: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +137,9 @@ def _subsets(
             for edge in chain.from_iterable(map(space.out_edges, subset)):
                 after[labels[edge]].add(alike[targets[edge]])
             facts = [true[node] for node in subset]
+            certain = reduce(and_, facts)
             moves = {own: tuple(sorted(nodes)) for own, nodes in sorted(after.items())}
-            layer[subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
+            layer[subset] = Knowledge(certain, reduce(or_, facts) & ~certain), moves
             members += len(subset)
             if most is not None and members > most:
                 what = f"a robot's histories have more than {most:,} members"

@@ -119,7 +119,7 @@ def knowing_own(fits: PlanSpace, robot: int) -> RobotChoices:
         adds, deletes = by_label[label]
         true[after] = (true[node] & ~deletes) | adds  # the same on all ways to a node
     automaton = determinise(fits, robot, true)
-    known = tuple(Knowledge(own.true, own.true | others) for own in automaton.known)
+    known = tuple(Knowledge(own.true, others) for own in automaton.known)
     return RobotChoices(robot, replace(automaton, known=known), "own")
 
 

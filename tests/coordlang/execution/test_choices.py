@@ -57,10 +57,10 @@ def check_automata(found: SentenceChoices, twin: Listed) -> None:
             state = 0
             for step in range(len(part) + 1):
                 assert state in automaton.layers[step]
-                true, possible = automaton.known[state]
+                true, unknown = automaton.known[state]
                 said = (
                     frozenset(f for n, f in enumerate(facts) if true >> n & 1),
-                    frozenset(f for n, f in enumerate(facts) if not possible >> n & 1),
+                    frozenset(f for n, f in enumerate(facts) if not (true | unknown) >> n & 1),
                 )
                 if own.atoms == "exact":
                     assert said == known[part[:step]]
@@ -173,9 +173,9 @@ def check_own_atoms(
     for part in twin.own[own.robot]:
         state = 0
         for step, label in enumerate((*part, None)):
-            true, possible = own.automaton.known[state]
+            true, unknown = own.automaton.known[state]
             for number, fact in enumerate(facts):
-                says = ("false", "unknown", "true")[(true >> number & 1) + (possible >> number & 1)]
+                says = ("false", "true", "unknown")[(true >> number & 1) - (unknown >> number & 1)]
                 seen[says] += 1
                 assert (says == "unknown") == (not mask >> number & 1)
                 assert says == "unknown" or fact in known[part[:step]][says == "false"]
