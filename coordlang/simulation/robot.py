@@ -4,7 +4,7 @@
 It knows the map, its own choices under the sentence (a monitor), where its own subactions lead,
 and what its sensors and the other robots' messages tell it.  It never sees the plan of another
 robot, nor the simulator: this module and those that it imports need the standard library and the
-monitor only, and numbers and texts are all that goes in and out.
+monitor only.  Numbers and texts are all that goes in and out, and what its lidar is asked for.
 """
 
 from __future__ import annotations
