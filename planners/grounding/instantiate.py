@@ -6,7 +6,7 @@ Static atoms, equalities and types are evaluated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 from functools import cache
 from math import prod
@@ -47,80 +47,6 @@ Guard = Atom | StepAtom
 _Shape = tuple[tuple[str, ...], tuple[Atom, ...], tuple[StepAtom, ...]]
 #: From this many values for the variables on, only subactions that are ever possible are tried.
 _MANY = 1000
-
-
-class Bindings:
-    """The objects of a problem, its static facts and its possible subactions.
-
-    ``objects`` numbers those of some types in their order.  ``instances``: action -> the arguments
-    with which it may ever be done; empty if unknown.
-    """
-
-    def __init__(
-        self,
-        objects: Callable[[tuple[str, ...]], Mapping[str, int]],
-        statics: Iterable[Atom],
-        instances: Mapping[str, Sequence[Arguments]],
-    ) -> None:
-        self.objects, self._instances = objects, instances
-        #: The arguments with which a guard is true, by what it is about and their number.
-        self._true: dict[tuple[type[Guard], str, int], list[Arguments]] = {}
-        for fact in statics:
-            self._true.setdefault((Atom, fact.predicate, len(fact.args)), []).append(fact.args)
-        for action, own in instances.items():
-            for args in own:
-                self._true.setdefault((StepAtom, action, len(args)), []).append(args)
-        #: For a guard, the places of known arguments and a wanted one: known values -> the others.
-        self._tables: dict[tuple[object, ...], dict[Arguments, set[str]]] = {}
-
-    def values(
-        self,
-        variables: tuple[Variable, ...],
-        binding: Binding,
-        statics: tuple[Atom, ...] = (),
-        steps: tuple[StepAtom, ...] = (),
-    ) -> Iterator[Binding]:
-        """Bindings of the variables too, in the order of the objects.
-
-        Many that make one of the guards false are left out, the others are left to the formula.
-        Only where there are many values, subactions are guards, too (`coordlang inspect` names
-        subactions that a formula speaks of and that nobody can ever do).
-        """
-        named = {arg for guard in statics for arg in guard.args}
-        others = [self.objects(v.types) for v in variables if v.name not in named]
-        guards: tuple[Guard, ...] = statics
-        if self._instances and prod(map(len, others)) > _MANY:
-            guards += steps
-        own = {v.name for v in variables}
-        outer = {name: value for name, value in binding.items() if name not in own}
-        return self._extended(outer, variables, guards)
-
-    def _extended(
-        self, binding: Binding, variables: tuple[Variable, ...], guards: tuple[Guard, ...]
-    ) -> Iterator[Binding]:
-        if not variables:
-            yield binding
-            return
-        name, members = variables[0].name, self.objects(variables[0].types)
-        fitting: Set[str] = members.keys()
-        for guard in guards:
-            if name in guard.args:
-                fitting = fitting & self._allowed(guard, name, binding)
-        for value in sorted(fitting, key=members.__getitem__):
-            yield from self._extended({**binding, name: value}, variables[1:], guards)
-
-    def _allowed(self, guard: Guard, name: str, binding: Binding) -> Set[str]:
-        """The values of a variable with which a guard may be true, by its known arguments."""
-        about = guard.predicate if isinstance(guard, Atom) else guard.action
-        values = [binding.get(arg, arg) for arg in guard.args]
-        known = [n for n, value in enumerate(values) if not value.startswith("?")]
-        kind, place = (type(guard), about, len(values)), guard.args.index(name)
-        table = self._tables.get((kind, place, *known))
-        if table is None:
-            table = self._tables[kind, place, *known] = {}
-            for args in self._true.get(kind, ()):
-                table.setdefault(tuple(args[n] for n in known), set()).add(args[place])
-        return table.get(tuple(values[n] for n in known), frozenset())
 
 
 #: What to try when grounding is too much.
@@ -189,22 +115,31 @@ def _bound(atom: Atom, binding: Binding) -> Atom:
 
 
 class _Grounder:
+    """Puts arguments into formulas; ``reachable`` are those of actions, empty if unknown."""
+
     def __init__(
         self,
         domain: Domain,
         problem: Problem,
         team: Team,
-        reachable: Mapping[str, Sequence[tuple[str, ...]]],
+        reachable: Mapping[str, list[Arguments]],
     ) -> None:
-        self._problem = problem
-        self._team = team
+        self._problem, self._team, self._reachable = problem, team, reachable
         self._fluents = fluent_predicates(domain)
         self._statics = static_atoms(domain, problem)
         self._schemas = {schema.name: schema for schema in domain.schemas}
-        objects = cache(
+        #: The objects of some types, numbered in their order.
+        self._objects = cache(
             lambda types: {o: n for n, o in enumerate(objects_of(domain, problem, types))}
         )
-        self._bindings = Bindings(objects, self._statics, reachable)
+        #: The arguments with which a guard is true, by what it is about and their number.
+        self._true: dict[tuple[type[Guard], str, int], list[Arguments]] = {
+            (StepAtom, action, len(own[0])): own for action, own in reachable.items() if own
+        }
+        for fact in self._statics:
+            self._true.setdefault((Atom, fact.predicate, len(fact.args)), []).append(fact.args)
+        #: For a guard, the places of known arguments and a wanted one: known values -> the others.
+        self._tables: dict[tuple[object, ...], dict[Arguments, set[str]]] = {}
         self._owners_of = cache(self._owners_named)
         #: Ground quantified formulas by the values of variables in them: actions share most.
         self._quantified: dict[tuple[object, ...], Formula] = {}
@@ -275,16 +210,65 @@ class _Grounder:
         found = self._quantified.get(key)
         if found is None:
             kind = And if isinstance(f, Forall) == positive else Or
-            instances = self._bindings.values(f.variables, binding, statics, steps)
+            instances = self._values(f.variables, binding, statics, steps)
             ground = (self.formula(f.part, inner, positive, acting) for inner in instances)
             found = joined(kind, ground)
             if steps and isinstance(found, Truth):
                 # One subaction that nobody can ever do stays, so that what is beside it counts.
-                instances = self._bindings.values(f.variables, binding, statics)
+                instances = self._values(f.variables, binding, statics)
                 ground = (self.formula(f.part, inner, positive, acting) for inner in instances)
                 found = next((one for one in ground if not isinstance(one, Truth)), found)
             self._quantified[key] = found
         return found
+
+    def _values(
+        self,
+        variables: tuple[Variable, ...],
+        binding: Binding,
+        statics: tuple[Atom, ...] = (),
+        steps: tuple[StepAtom, ...] = (),
+    ) -> Iterator[Binding]:
+        """Bindings of the variables too, in the order of the objects.
+
+        Many that make one of the guards false are left out, the others are left to the formula.
+        Only where there are many values, subactions are guards, too (`coordlang inspect` names
+        subactions that a formula speaks of and that nobody can ever do).
+        """
+        named = {arg for guard in statics for arg in guard.args}
+        others = [self._objects(v.types) for v in variables if v.name not in named]
+        guards: tuple[Guard, ...] = statics
+        if self._reachable and prod(map(len, others)) > _MANY:
+            guards += steps
+        own = {v.name for v in variables}
+        outer = {name: value for name, value in binding.items() if name not in own}
+        return self._extended(outer, variables, guards)
+
+    def _extended(
+        self, binding: Binding, variables: tuple[Variable, ...], guards: tuple[Guard, ...]
+    ) -> Iterator[Binding]:
+        if not variables:
+            yield binding
+            return
+        name, members = variables[0].name, self._objects(variables[0].types)
+        fitting: Set[str] = members.keys()
+        for guard in guards:
+            if name in guard.args:
+                fitting = fitting & self._allowed(guard, name, binding)
+        for value in sorted(fitting, key=members.__getitem__):
+            yield from self._extended({**binding, name: value}, variables[1:], guards)
+
+    def _allowed(self, guard: Guard, name: str, binding: Binding) -> Set[str]:
+        """The values of a variable with which a guard may be true, by its known arguments."""
+        about = guard.predicate if isinstance(guard, Atom) else guard.action
+        values = [binding.get(arg, arg) for arg in guard.args]
+        known = [n for n, value in enumerate(values) if not value.startswith("?")]
+        kind, place = (type(guard), about, len(values)), guard.args.index(name)
+        table = self._tables.get((kind, place, *known))
+        if table is None:
+            table = self._tables[kind, place, *known] = {}
+            for args in self._true.get(kind, ()):
+                table.setdefault(tuple(args[n] for n in known), set()).add(args[place])
+        return table.get(tuple(values[n] for n in known), frozenset())
 
     def _shape_of(self, f: Forall | Exists) -> _Shape:
         """The variables in a formula, and its guards.
@@ -323,13 +307,13 @@ class _Grounder:
         """The owners of a subaction that a formula names; None for arguments of other types."""
         schema = self._schemas[action]
         for parameter, arg in zip(schema.parameters, args, strict=True):
-            if arg not in self._bindings.objects(parameter.types):
+            if arg not in self._objects(parameter.types):
                 return None
         return frozenset(self._team.owners(schema, args))
 
     def _effect(self, effect: Effect, binding: Binding) -> Iterator[Effect]:
         guards = self._static_atoms(effect.condition) if effect.variables else ()
-        for inner in self._bindings.values(effect.variables, binding, guards):
+        for inner in self._values(effect.variables, binding, guards):
             condition = self.formula(effect.condition, inner, True)
             if condition != FALSE:
                 yield Effect(_bound(effect.atom, inner), effect.adds, condition)
@@ -349,12 +333,12 @@ class _Grounder:
         Instances with a precondition that is false in every state are none.  Of arguments that
         matter neither for that nor for the owner and the cost only the first is taken.
         """
-        objects = {p.name: self._bindings.objects(p.types) for p in schema.parameters}
+        objects = {p.name: self._objects(p.types) for p in schema.parameters}
         if not all(objects.values()):
             return
         first = {name: next(iter(own)) for name, own in objects.items()}
         guards = self._static_atoms(schema.precondition)
-        for binding in self._bindings.values(self._deciding(schema), first, guards):
+        for binding in self._values(self._deciding(schema), first, guards):
             owners = self._team.owners(schema, tuple(binding[p.name] for p in schema.parameters))
             cost = schema.cost
             is_given = not isinstance(cost, Atom) or _bound(cost, binding) in self._problem.values
@@ -372,7 +356,7 @@ class _Grounder:
         return tuple(
             p
             for p in schema.parameters
-            if p.name in named or not robots.isdisjoint(self._bindings.objects(p.types))
+            if p.name in named or not robots.isdisjoint(self._objects(p.types))
         )
 
     def _cost(self, schema: Schema, binding: Binding) -> int:

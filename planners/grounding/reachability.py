@@ -30,14 +30,13 @@ if TYPE_CHECKING:
     from clingo import Control, Symbol
 
 Arguments = tuple[str, ...]
-#: The same by the objects' numbers.
-_Numbers = tuple[int, ...]
 
 #: Combinations of values from which on clingo may look for an instance of a rule for seconds.
 _LONG_JOIN = 10**8
 #: Bytes that an instance of a schema takes at least, in clingo and here.
 _INSTANCE = 150
 _VARIABLE = re.compile(r"\bV\d+\b")
+_OBJECT = re.compile(r"\bo(\d+)")
 
 
 def reachable_arguments(
@@ -64,14 +63,14 @@ def reachable_arguments(
         for name in objects_of(domain, problem, types):
             core.problem.init.add(core.predicate(types, 1), core.objects[name])
     program, _ = create_reachability_lp(core.problem)
-    found = _least_model([_interruptible(rule, len(names)) for rule in program.rules])
-    return {
-        schema.name: [
-            tuple([names[number] for number in args])
-            for args in sorted({*found.get(f"action_a{number}", ())})
-        ]
-        for number, schema in enumerate(domain.schemas)
-    }
+    model = _least_model([_interruptible(rule, len(names)) for rule in program.rules])
+    found: dict[str, list[Arguments]] = {}
+    for number, schema in enumerate(domain.schemas):
+        atoms = model.symbolic_atoms.by_signature(f"action_a{number}", len(schema.parameters))
+        # Of each atom the text: one call of clingo for all of its arguments.
+        numbers = sorted([*map(int, _OBJECT.findall(str(atom.symbol)))] for atom in atoms)
+        found[schema.name] = [tuple([names[each] for each in args]) for args in numbers]
+    return found
 
 
 def _require_memory(domain: Domain, problem: Problem) -> None:
@@ -92,8 +91,8 @@ def _require_memory(domain: Domain, problem: Problem) -> None:
             )
 
 
-def _least_model(rules: Sequence[str]) -> dict[str, list[_Numbers]]:
-    """The numbers of each action's arguments in the least model of a Datalog program."""
+def _least_model(rules: Sequence[str]) -> Control:
+    """A clingo that has found the least model of a Datalog program: its symbolic atoms."""
     from clingo import Control
 
     messages: list[str] = []
@@ -111,14 +110,9 @@ def _least_model(rules: Sequence[str]) -> dict[str, list[_Numbers]]:
         _ground(control)
     except RuntimeError as error:
         raise _failed(" ".join((str(error), *messages))) from error
-    atoms = control.symbolic_atoms
-    if not any(atoms.by_signature("goal", 0)):
+    if not any(control.symbolic_atoms.by_signature("goal", 0)):
         raise _failed("its grounding is not complete")
-    return {
-        predicate: [_arguments(str(atom.symbol)) for atom in atoms.by_signature(predicate, arity)]
-        for predicate, arity, _ in atoms.signatures
-        if predicate.startswith("action_")
-    }
+    return control
 
 
 def _failed(said: str) -> CoordlangError:
@@ -126,12 +120,6 @@ def _failed(said: str) -> CoordlangError:
         f"clingo does not ground the reachability program: {said}",
         remedy="Install clingo again (`pip install --force-reinstall clingo`).",
     )
-
-
-def _arguments(symbol: str) -> _Numbers:
-    """The numbers in ``p(o1,o2)``: one call of clingo for all of them."""
-    _, _, inner = symbol.partition("(")
-    return tuple([int(name[1:]) for name in inner[:-1].split(",")]) if inner else ()
 
 
 def _interruptible(rule: str, objects: int) -> str:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from planners.grounding.actions import GroundAction
 from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bits
 from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
-from planners.pddl.formula_tree import Compound, GroundLeaf, Leaf, conjuncts, fold, literals, signed
-from planners.pddl.lifted import TRUE, And, Atom, Effect, Formula, Junction, Not, StepAtom, Truth
+from planners.pddl.formula_tree import GroundLeaf, conjuncts, literals, signed
+from planners.pddl.lifted import TRUE, And, Atom, Effect, Formula, Not, Or, StepAtom, Truth
 
 Labels = NDArray[np.int32]
 
@@ -37,29 +37,23 @@ class Evaluator:
 
         One entry for each ``k``.
         """
-        count = len(which)
-
-        def leaf(found: Leaf) -> Bools:
-            match found:
-                case Truth(value):
-                    return np.full(count, value)
-                case Atom() if (number := self.facts.index.get(found)) is not None:
-                    return test_bits(rows, which, number)
-                case StepAtom() if (subaction := self.subactions.get(found)) is not None:
-                    assert labels is not None, "a formula about the joint step without labels"
-                    robot, label = subaction
-                    return np.asarray(labels[:, robot] == label)
-            return np.zeros(count, np.bool_)
-
-        def compound(kind: Compound, parts: Iterator[Bools]) -> Bools:
-            if isinstance(kind, Not):
-                return ~next(parts)
-            assert isinstance(kind, Junction), "a quantifier in a ground formula"
-            if isinstance(kind, And):
-                return reduce(np.logical_and, parts, np.ones(count, np.bool_))
-            return reduce(np.logical_or, parts, np.zeros(count, np.bool_))
-
-        return fold(formula, leaf, compound)
+        match formula:
+            case Not(part):
+                return ~self.holds(part, rows, which, labels)
+            case And(parts) | Or(parts):
+                combine = np.logical_and if isinstance(formula, And) else np.logical_or
+                values = (self.holds(part, rows, which, labels) for part in parts)
+                return reduce(combine, values, np.full(len(which), combine.identity))
+            case Truth(value):
+                return np.full(len(which), value)
+            case Atom() if (number := self.facts.index.get(formula)) is not None:
+                return test_bits(rows, which, number)
+            case StepAtom() if (subaction := self.subactions.get(formula)) is not None:
+                assert labels is not None, "a formula about the joint step without labels"
+                robot, label = subaction
+                return np.asarray(labels[:, robot] == label)
+        assert isinstance(formula, GroundLeaf), "not a ground formula"
+        return np.zeros(len(which), np.bool_)
 
 
 def speaks_of_step(formula: Formula) -> bool:
