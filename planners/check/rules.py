@@ -56,10 +56,6 @@ class Touched:
     adds: frozenset[Atom]
     deletes: frozenset[Atom]
 
-    def needed(self, positive: bool) -> frozenset[Atom | StepAtom]:
-        """What it requires to be true, or to be false."""
-        return frozenset(atom for atom, value in self.needs if value == positive)
-
 
 class Rules:
     """The rules of joint steps for one problem and its team."""
@@ -171,11 +167,11 @@ class Rules:
         mine, theirs = self.touched(one, other), self.touched(other, one)
         if both := mine.deletes & theirs.adds:
             return f"{one.text} deletes {_first(both)}, which {other.text} adds"
-        if self._names(one, other) or self._names(other, one) or self._joined(one, other):
-            return None  # linked: meant to be done together
-        if both := mine.deletes & theirs.needed(True):
+        if self._linked(one, other):
+            return None  # meant to be done together
+        if both := frozenset(atom for atom in mine.deletes if (atom, True) in theirs.needs):
             return f"{one.text} deletes {_first(both)}, which {other.text} requires"
-        if both := mine.adds & theirs.needed(False):
+        if both := frozenset(atom for atom in mine.adds if (atom, False) in theirs.needs):
             return f"{one.text} adds {_first(both)}, which {other.text} requires to be false"
         return None
 
@@ -212,18 +208,20 @@ class Rules:
             )
         }
 
-    def _joined(self, one: Instance, other: Instance) -> bool:
-        """Linked by a constraint that takes two or more, or by two that depend on each other."""
+    def _linked(self, one: Instance, other: Instance) -> bool:
+        """Whether a positive literal of a condition of one is the other, or the network joins them.
+
+        By a constraint that takes two or more, or by two that depend on each other.
+        """
+        for action, named in ((one, other), (other, one)):
+            if (named.name, True) in self.touched(action).needs:
+                return True
         by_name = {constraint.name: constraint for constraint in self.domain.constraints}
         pairs = [(c.name, c.name) for c in self.domain.constraints if c.low > 1]
         pairs += [pair for v, w in self.domain.dependences for pair in ((v, w), (w, v))]
         return any(
             self._matches(by_name[v], one) & self._matches(by_name[w], other) for v, w in pairs
         )
-
-    def _names(self, one: Instance, other: Instance) -> bool:
-        """Whether a positive literal of a condition of ``one`` is the subaction ``other``."""
-        return other.name in self.touched(one).needed(True)
 
     def touched(self, action: Instance, other: Instance | None = None) -> Touched:
         """Conditional effects count as if they fired and their conditions as required.

@@ -200,19 +200,14 @@ class ComposingStepper(Stepper):
             )
 
     def _apply(self, rows: Rows, source: Ints, labels: Labels) -> tuple[Rows, Ints]:
-        result, cost = rows[source], np.zeros(len(source), np.int64)
+        before, cost = rows[source], np.zeros(len(source), np.int64)
+        adds, deletes = np.zeros_like(before), np.zeros_like(before)
         for robot, mine in zip(self._robot, labels.T, strict=True):
-            result &= ~robot.operators.deletes[mine]
-            result |= robot.operators.adds[mine]
+            added, deleted = robot.operators.changes(rows, source, mine, labels)
+            adds |= added
+            deletes |= deleted
             cost += robot.cost[mine]
-        if any(robot.operators.conditional for robot in self._robot):
-            adds, deletes = np.zeros_like(result), np.zeros_like(result)
-            for i, robot in enumerate(self._robot):
-                mine = labels[:, i]
-                adds |= robot.operators.adds[mine]
-                robot.operators.enter_conditional((adds, deletes), rows, source, mine, labels)
-            result = (result & ~deletes) | adds
-        return result, cost
+        return (before & ~deletes) | adds, cost
 
 
 class _Subactions:
@@ -315,9 +310,8 @@ class JointActionStepper(Stepper):
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
         """See `Stepper`; ``options`` are not looked at: no robot chooses by itself."""
         row, operator = self._operators.applicable(rows)
-        changed = self._operators.adds[operator], self._operators.deletes[operator]
-        self._operators.enter_conditional(changed, rows, row, operator)
-        result = (rows[row] & ~changed[1]) | changed[0]
+        adds, deletes = self._operators.changes(rows, row, operator)
+        result = (rows[row] & ~deletes) | adds
         labels = self._labels[operator]
         # Of joint actions with the same parts the cheapest comes first, and is kept.
         order = np.lexsort((self._cost[operator], *labels.T[::-1], row))

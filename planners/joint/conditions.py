@@ -180,22 +180,19 @@ class Operators:
         order = np.lexsort((operator, row))
         return row[order], operator[order]
 
-    def enter_conditional(
-        self,
-        changed: tuple[Rows, Rows],
-        rows: Rows,
-        source: Ints,
-        chosen: Numbers,
-        labels: Labels | None = None,
-    ) -> None:
-        """Enter what ``chosen[k]`` adds to ``rows[source[k]]`` and deletes by conditional effects.
+    def changes(
+        self, rows: Rows, source: Ints, chosen: Numbers, labels: Labels | None = None
+    ) -> tuple[Rows, Rows]:
+        """What ``chosen[k]`` adds to ``rows[source[k]]``, and what it deletes.
 
         ``labels[k]`` are what all robots do beside, where conditions may speak of that.
         """
+        adds, deletes = self.adds[chosen], self.deletes[chosen]
         for number, effects in self.conditional.items():
             there = np.flatnonzero(chosen == number)
             beside = None if labels is None else labels[there]
             for effect in effects if len(there) else ():
                 fires = self._evaluator.holds(effect.condition, rows, source[there], beside)
-                into = changed[0] if effect.adds else changed[1]
+                into = adds if effect.adds else deletes
                 self._codec.set(into, there[fires], self._codec.facts.index[effect.atom])
+        return adds, deletes

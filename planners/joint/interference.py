@@ -132,6 +132,8 @@ class Choices:
 
     def __init__(self, actions: Sequence[GroundAction | None]) -> None:
         self.actions = actions
+        #: The subactions with more than one owner, by label.
+        self.shared = {n: a for n, a in enumerate(actions) if a and len(a.owners) > 1}
         #: By field of the footprint the labels in which each atom stands there.
         self.labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint._fields}
         for number, action in enumerate(actions):
@@ -157,11 +159,11 @@ def compatible(left: Choices, right: Choices, i: int, j: int) -> Bools:
         a, b = left.actions[row], right.actions[column]
         table[row, column] = not (a and b and conflict(a, b))
     # A subaction owned by both robots is chosen by both or by neither.
-    ours = {n: a for n, a in enumerate(left.actions) if a and j in a.owners}
-    table[[*ours]] = False
-    table[:, [n for n, a in enumerate(right.actions) if a and i in a.owners]] = False
-    for number, action in ours.items():
-        table[number, right.labels["names"][_name(action)]] = True
+    ours = [number for number, action in left.shared.items() if j in action.owners]
+    table[ours] = False
+    table[:, [number for number, action in right.shared.items() if i in action.owners]] = False
+    for number in ours:
+        table[number, right.labels["names"][_name(left.shared[number])]] = True
     return table
 
 
