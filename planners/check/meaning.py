@@ -75,24 +75,19 @@ class Meaning:
         true = moment.state if isinstance(atom, Atom) else moment.step
         return true is None or (atom in true) == positive
 
-    def fails(self, formula: Formula, binding: Binding, moment: Moment) -> str | None:
-        """Why a formula does not hold, in words; None if it does."""
-        if self.holds(formula, binding, True, moment):
+    def fails(
+        self, formula: Formula, binding: Binding, moment: Moment, positive: bool = True
+    ) -> str | None:
+        """Why a formula (negated unless ``positive``) does not hold, in words; None if it does."""
+        if self.holds(formula, binding, positive, moment):
             return None
-        return self.why_not(formula, binding, True, moment)
-
-    def why_not(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> str:
-        """Why a formula that does not hold does not hold, in words."""
         if isinstance(formula, Not):
-            return self.why_not(formula.part, binding, not positive, moment)
+            return self.fails(formula.part, binding, moment, not positive)
         branches = self._branches(formula, binding)
         if branches is None:
             return self._literal_fails(formula, binding, positive)
-        failing = [
-            self.why_not(part, inner, positive, moment)
-            for part, inner in branches
-            if not self.holds(part, inner, positive, moment)
-        ]
+        whys = (self.fails(part, inner, moment, positive) for part, inner in branches)
+        failing = [why for why in whys if why is not None]
         if _is_conjunction(formula, positive):
             return failing[0]
         if len(failing) > 3:

@@ -107,7 +107,7 @@ def clashes(
     """
     linked = _naming(actions, _partners)
     # The condition of an effect of one names the other: what can happen depends on both.
-    special = _naming(actions, _in_effects)
+    special = _naming(actions, lambda a: [x for e in a.effects for x, _ in literals(e.condition)])
     alone = {number: _with_effects(action) for number, action in enumerate(actions)}
     pairs = _contrary(alone, linked) - special
     for pair in special:
@@ -136,11 +136,6 @@ def _naming(
 def _partners(action: GroundAction) -> Set[object]:
     """What links name, and positive literals."""
     return action.links | {leaf for leaf, positive in _conditions(action) if positive}
-
-
-def _in_effects(action: GroundAction) -> Set[object]:
-    """What the conditions of its effects name."""
-    return {leaf for effect in action.effects for leaf, _ in literals(effect.condition)}
 
 
 def _contrary(actions: Mapping[int, GroundAction], linked: _Pairs) -> _Pairs:
