@@ -124,7 +124,8 @@ class StateCodec:
             for robot, labels, last in zip(
                 self.robots, self.memory, row[self.fact_blocks :], strict=True
             ):
-                atoms.append(f"(last {robot} {('none', *labels)[last]})")
+                name = "none" if last == 0 else labels[int(last) - 1]
+                atoms.append(f"(last {robot} {name})")
             atoms.sort()
         return atoms
 
@@ -172,9 +173,11 @@ class StateCodec:
         robot, _, name = atom[len("(last ") : -1].partition(" ")
         if robot in self.robots:
             position = self.robots.index(robot)
-            names = "none", *self.memory[position]
-            if name in names:
-                row[self.fact_blocks + position] = names.index(name)
+            if name == "none":
+                return
+            if name in self.memory[position]:
+                number = self.memory[position].index(name) + 1
+                row[self.fact_blocks + position] = np.uint64(number)
                 return
         raise BadInput(
             f"{atom} names no robot's subaction of this model",
