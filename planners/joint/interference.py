@@ -11,7 +11,7 @@ import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.tables import Bools
-from planners.pddl.formula_tree import Leaf, forbidden_steps, label, literals, substituted
+from planners.pddl.formula_tree import Leaf, forbidden_steps, formula_text, literals, substituted
 from planners.pddl.lifted import FALSE, Atom, Effect, Formula, StepAtom, Truth
 
 T = TypeVar("T")
@@ -119,8 +119,7 @@ def conflict(a: GroundAction, b: GroundAction) -> str | None:
 
 
 def _show(atoms: frozenset[Atom]) -> str:
-    atom = min(atoms, key=str)
-    return label(atom.predicate, atom.args)
+    return formula_text(min(atoms, key=str))
 
 
 class Choices:
@@ -172,7 +171,6 @@ def meeting(left: Choices, right: Choices, one: str, other: str) -> Bools:
     found = np.zeros((len(left.actions), len(right.actions)), np.bool_)
     for first, second in ((one, other), (other, one)):
         rows, columns = left.labels[first], right.labels[second]
-        for leaf in min(rows, columns, key=len):
-            if leaf in rows and leaf in columns:
-                found[np.array(rows[leaf])[:, None], columns[leaf]] = True
+        for leaf in rows.keys() & columns.keys():
+            found[np.ix_(rows[leaf], columns[leaf])] = True
     return found
