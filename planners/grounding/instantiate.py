@@ -140,7 +140,6 @@ class _Grounder:
             self._true.setdefault((Atom, fact.predicate, len(fact.args)), []).append(fact.args)
         #: For a guard, the places of known arguments and a wanted one: known values -> the others.
         self._tables: dict[tuple[object, ...], dict[Arguments, set[str]]] = {}
-        self._owners_of = cache(self._owners_named)
         #: Ground quantified formulas by the values of variables in them: actions share most.
         self._quantified: dict[tuple[object, ...], Formula] = {}
         self._shape = cache(self._shape_of)
@@ -295,21 +294,14 @@ class _Grounder:
     def _step_atom(
         self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
     ) -> Formula:
-        owners = self._owners_of(action, args)
-        if owners is None:
+        schema = self._schemas[action]
+        pairs = zip(schema.parameters, args, strict=True)
+        if any(arg not in self._objects(parameter.types) for parameter, arg in pairs):
             return Truth(not positive)
-        if not positive and not owners.isdisjoint(acting):
+        if not positive and not set(acting).isdisjoint(self._team.owners(schema, args)):
             return TRUE
         found = StepAtom(action, args)
         return found if positive else Not(found)
-
-    def _owners_named(self, action: str, args: tuple[str, ...]) -> frozenset[int] | None:
-        """The owners of a subaction that a formula names; None for arguments of other types."""
-        schema = self._schemas[action]
-        for parameter, arg in zip(schema.parameters, args, strict=True):
-            if arg not in self._objects(parameter.types):
-                return None
-        return frozenset(self._team.owners(schema, args))
 
     def _effect(self, effect: Effect, binding: Binding) -> Iterator[Effect]:
         guards = self._static_atoms(effect.condition) if effect.variables else ()
