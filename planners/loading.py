@@ -159,7 +159,7 @@ def _labels(
 def _step_atoms(subactions: Sequence[Sequence[GroundAction]]) -> dict[StepAtom, tuple[int, int]]:
     """The robot and label that a step atom speaks of: a shared subaction's first owner."""
     return {
-        StepAtom(action.schema, action.args): (robot, number + 1)
+        action.name: (robot, number + 1)
         for robot, own in reversed([*enumerate(subactions)])
         for number, action in enumerate(own)
     }

@@ -243,7 +243,7 @@ def _objects(loaded: PlanningInstance) -> dict[str, int]:
 
 def _formulas(model: JointModel) -> tuple[dict[str, int], tuple[str, ...]]:
     """How many subactions of each schema ask something of the others, and what the first asks."""
-    there = {StepAtom(action.schema, action.args) for action in model.actions}
+    there = {action.name for action in model.actions}
     asking: list[str] = []
     found: dict[tuple[str, str], str] = {}
     for action in model.actions:

@@ -27,7 +27,7 @@ from planners.classical.task import LONGEST, ClassicalTask, Form, Known
 from planners.classical.writer import TooManyError, Writer, goal_formula, known_literals
 from planners.joint.model import JointModel, PlanningTask, show
 from planners.pddl.formula_tree import GroundLeaf, joined, literals, substituted
-from planners.pddl.lifted import TRUE, And, Atom, Effect, Formula, StepAtom, Truth
+from planners.pddl.lifted import TRUE, And, Atom, Effect, Formula, Truth
 
 
 def compile_classical(
@@ -123,7 +123,7 @@ def _parts(team: Selectors, step: Sequence[int]) -> Sequence[str | None]:
 def _cases_of(team: Selectors, step: Sequence[int]) -> Iterator[tuple[Known, list[Effect]]]:
     """The disjoint cases in which a joint action is applicable, each with the effects that fire."""
     actions = [team.actions[number] for number in step]
-    chosen = {StepAtom(action.schema, action.args) for action in actions}
+    chosen = {action.name for action in actions}
     wanted = joined(And, [in_step(action.precondition, chosen) for action in actions])
     effects = [
         replace(effect, condition=in_step(effect.condition, chosen))

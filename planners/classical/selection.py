@@ -192,10 +192,7 @@ def select_then_apply(team: Selectors, model: JointModel, goal: Formula, step_co
 
     Robots without work skip a stage, and a step without work left ends when all have selected.
     """
-    who = {
-        StepAtom(action.schema, action.args): selected(team, action.owners[0], action.label)
-        for action in team.actions
-    }
+    who = {a.name: selected(team, a.owners[0], a.label) for a in team.actions}
 
     def value(leaf: GroundLeaf) -> Formula:
         """On the classical facts: a subaction is done if its first owner has selected it."""

@@ -125,7 +125,7 @@ def _naming(
     actions: Sequence[GroundAction], named: Callable[[GroundAction], Iterable[object]]
 ) -> _Pairs:
     """Pairs of which one names the other."""
-    number = {StepAtom(a.schema, a.args): n for n, a in enumerate(actions)}
+    number = {action.name: n for n, action in enumerate(actions)}
     return {
         frozenset((n, number[step]))
         for n, action in enumerate(actions)
@@ -163,7 +163,7 @@ def _contrary(actions: Mapping[int, GroundAction], linked: _Pairs) -> _Pairs:
 
 def _with_effects(action: GroundAction, *step: GroundAction) -> GroundAction:
     """The action with those effects only that may happen with these, and itself, in the step."""
-    there = {StepAtom(a.schema, a.args) for a in (action, *step)}
+    there = {each.name for each in (action, *step)}
     kept = tuple(e for e in action.effects if in_step(e.condition, there) != FALSE)
     return replace(action, effects=kept)
 

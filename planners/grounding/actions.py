@@ -56,6 +56,11 @@ class GroundAction:
         """The action in PDDL syntax."""
         return label(self.schema, self.args)
 
+    @property
+    def name(self) -> StepAtom:
+        """What formulas call it."""
+        return StepAtom(self.schema, self.args)
+
     def second_cost(self, cost: Cost) -> int:
         """The second component of its cost; of a joint action the parts that are not idle count."""
         if cost == "makespan+cost":
@@ -220,7 +225,7 @@ def _by_robot(group: Sequence[GroundAction], action: GroundAction) -> list[list[
     robots: dict[int, list[StepAtom]] = {}
     for other in group:
         if not set(other.owners) & set(action.owners):
-            robots.setdefault(other.owners[0], []).append(StepAtom(other.schema, other.args))
+            robots.setdefault(other.owners[0], []).append(other.name)
     return [robots[robot] for robot in sorted(robots)]
 
 

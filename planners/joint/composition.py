@@ -59,11 +59,8 @@ class ComposingStepper(Stepper):
             _Subactions(own, codec, evaluator, number, cost, idling_costs[number])
             for number, own in enumerate(self.labelled)
         ]
-
-    @property
-    def costs(self) -> list[Ints]:
-        """For each robot the second cost component of each of its labels."""
-        return [robot.cost for robot in self._robot]
+        #: For each robot the second cost component of each of its labels.
+        self.costs = [robot.cost for robot in self._robot]
 
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
         """See `Stepper`."""

@@ -61,7 +61,7 @@ def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> 
     adds = frozenset([e.atom for e in effects if e.adds])
     writes = frozenset([e.atom for e in action.effects])
     return Footprint(
-        names=frozenset((_name(action),)),
+        names=frozenset((action.name,)),
         requires_true=_leaves(Atom, required, (True,)),
         requires_false=_leaves(Atom, required, (False,)),
         adds=adds,
@@ -90,17 +90,12 @@ def _can_fire(condition: Formula, step: frozenset[StepAtom]) -> bool:
     return substituted(condition, value) != FALSE
 
 
-def _name(action: GroundAction) -> StepAtom:
-    """What formulas call an action."""
-    return StepAtom(action.schema, action.args)
-
-
 def conflict(a: GroundAction, b: GroundAction) -> str | None:
     """Why two subactions of different robots cannot share a step, in words; None if they can.
 
     The rule of docs/pddl.md, read literally; `compatible` is the same for whole tables.
     """
-    pair = frozenset((_name(a), _name(b)))
+    pair = frozenset((a.name, b.name))
     first, second = footprint(a, pair), footprint(b, pair)
     sides = ((a, first, b, second), (b, second, a, first))
     for one, own, other, its in sides:
@@ -137,7 +132,7 @@ class Choices:
         self.labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint._fields}
         for number, action in enumerate(actions):
             if action:
-                own = footprint(action, frozenset((_name(action),)))
+                own = footprint(action, frozenset((action.name,)))
                 for field, labels in self.labels.items():
                     for leaf in getattr(own, field):
                         labels.setdefault(leaf, []).append(number)
@@ -162,7 +157,7 @@ def compatible(left: Choices, right: Choices, i: int, j: int) -> Bools:
     table[ours] = False
     table[:, [number for number, action in right.shared.items() if i in action.owners]] = False
     for number in ours:
-        table[number, right.labels["names"][_name(left.shared[number])]] = True
+        table[number, right.labels["names"][left.shared[number].name]] = True
     return table
 
 
