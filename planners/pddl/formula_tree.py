@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 from planners.pddl.lifted import (
@@ -159,13 +159,16 @@ def formula_text(formula: Formula) -> str:
         case Not(part):
             return label("not", (formula_text(part),))
         case Quantified(variables, part):
-            declared = f"({' '.join(map(declaration, variables))})"
-            return label(type(formula).__name__.lower(), (declared, formula_text(part)))
+            return label(type(formula).__name__.lower(), (declared(variables), formula_text(part)))
         case Junction(parts):
             return label(type(formula).__name__.lower(), map(formula_text, parts))
 
 
-def declaration(variable: Variable) -> str:
-    """A variable with its types, as in a list of parameters: ``?x - (either a b)``."""
-    types = variable.types
-    return f"{variable.name} - {types[0] if len(types) == 1 else label('either', types)}"
+def declared(variables: Iterable[Variable]) -> str:
+    """Variables with their types, as a list of parameters: ``(?x - (either a b) ?y - c)``."""
+    return f"({' '.join(typed(variable.name, variable.types) for variable in variables)})"
+
+
+def typed(name: str, types: Sequence[str]) -> str:
+    """A name with its types, as in any typed list."""
+    return f"{name} - {types[0] if len(types) == 1 else label('either', types)}"

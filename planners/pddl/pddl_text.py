@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
 from math import isinf
 
-from planners.pddl.formula_tree import declaration, formula_text, label
+from planners.pddl.formula_tree import declared, formula_text, label, typed
 from planners.pddl.lifted import TRUE, And, Constraint, Domain, Effect, Formula, Problem, Schema
 
 #: Characters that are in no name of what coordlang writes for others' names.
@@ -80,13 +80,7 @@ def _section(head: str, entries: Iterable[str]) -> list[str]:
 
 
 def _typed(names: Mapping[str, tuple[str, ...]]) -> list[str]:
-    return [f"{name} - {_types(types)}" for name, types in names.items()]
-
-
-def _types(types: tuple[str, ...]) -> str:
-    if len(types) > 1:
-        return label("either", types)
-    return types[0] if types else "object"
+    return [typed(name, types or ("object",)) for name, types in names.items()]
 
 
 def _signatures(names: Mapping[str, Iterable[int]]) -> list[str]:
@@ -98,11 +92,12 @@ def _signatures(names: Mapping[str, Iterable[int]]) -> list[str]:
 
 
 def _action(schema: Schema) -> list[str]:
-    parameters, agent = schema.parameters, ""
+    parameters, agent = [*schema.parameters], ""
     if schema.agent is not None:
         agent = f"    :agent {parameters[schema.agent].name}"
     if schema.agent == 0:  # it comes first, and is declared where it is named
-        agent, parameters = f"    :agent {declaration(parameters[0])}", parameters[1:]
+        first, *parameters = parameters
+        agent = f"    :agent {typed(first.name, first.types)}"
     effects = [_effect(effect) for effect in schema.effects]
     if schema.cost is not None:
         cost = schema.cost if isinstance(schema.cost, int) else formula_text(schema.cost)
@@ -110,7 +105,7 @@ def _action(schema: Schema) -> list[str]:
     return [
         f"  (:action {schema.name}",
         *([agent] if agent else []),
-        f"    :parameters ({' '.join(map(declaration, parameters))})",
+        f"    :parameters {declared(parameters)}",
         *(f"    ; subaction {part.robot} {_part(part.template)}" for part in schema.parts),
         f"    :precondition {_condition(schema.precondition)}",
         f"    :effect {label('and', effects)})",
@@ -127,7 +122,7 @@ def _effect(effect: Effect) -> str:
     if effect.condition != TRUE:
         text = label("when", (_condition(effect.condition), text))
     if effect.variables:
-        text = label("forall", (f"({' '.join(map(declaration, effect.variables))})", text))
+        text = label("forall", (declared(effect.variables), text))
     return text
 
 
@@ -140,7 +135,7 @@ def _constraint(constraint: Constraint) -> str:
     actions = " ".join(label(name, map(str, numbers)) for name, numbers in constraint.actions)
     return (
         f"  (:concurrency-constraint {constraint.name}\n"
-        f"    :parameters ({' '.join(map(declaration, constraint.parameters))})\n"
+        f"    :parameters {declared(constraint.parameters)}\n"
         f"    :bounds ({constraint.low} {high})\n"
         f"    :actions ({actions}))"
     )

@@ -16,7 +16,7 @@ from unicodedata import normalize
 
 from planners.system.errors import BadInput, Position, Unsupported
 from planners.system.files import not_utf8, read_stored_bytes, require_seen
-from planners.system.messages import UNSEEN, echoed
+from planners.system.messages import echoed
 
 #: A byte that is not UTF-8, as Python's ``surrogateescape`` decodes it.
 _NOT_DECODED = re.compile("[\udc80-\udcff]")
@@ -260,8 +260,7 @@ def _require_plain_names(source: Source) -> None:
         return
     names = [(m[0], m.start()) for m in _TOKEN.finditer(source.text) if m[0][0] != ";"]
     for name, offset in names:
-        if re.search(UNSEEN, name):
-            require_seen(name, source.position(offset))
+        require_seen(name, source.position(offset))
     seen: dict[str, str] = {}
     for name, offset in names:
         other = seen.setdefault(normalize("NFKC", name).casefold(), name)
