@@ -178,35 +178,13 @@ _NUMBERED = re.compile(r".*-\d+")
 _Box = tuple[float, float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Label:
-    """The name of a place beside it, with its ``anchor`` (start, middle or end) at a point."""
-
-    text: str
-    x: float
-    y: float
-    anchor: str
-
-
-@dataclass(frozen=True, slots=True)
-class FloorPlan:
-    """Where the places of a map are drawn, by number, with a common radius.
-
-    ``links`` join places; ``labels`` are the names for which there is room.
-    """
-
-    width: float
-    height: float
-    radius: float
-    points: tuple[Point, ...]
-    links: tuple[tuple[int, int], ...]
-    labels: tuple[Label, ...]
-
-
 def floor_plan(
     names: Sequence[str], places: Sequence[Point], links: Sequence[tuple[int, int]]
-) -> FloorPlan:
-    """Draw places at their coordinates, given names first.  O(places^2 + places x links)."""
+) -> dict[str, Any]:
+    """Where places are drawn, with a common radius, and the ``labels`` for which there is room.
+
+    Names that somebody gave come first.  O(places^2 + places x links).
+    """
     left, top, right, bottom = (
         pick(point[axis] for point in places) for pick in (min, max) for axis in (0, 1)
     )
@@ -220,8 +198,9 @@ def floor_plan(
     nearest = min((math.dist(a, b) for a, b in combinations(points, 2)), default=math.inf)
     radius = round(min(max(0.42 * nearest, _RADII[0]), _RADII[1]), 1)
     height = round(2 * _AROUND + scale * (bottom - top), 1)
-    labels = tuple(_labels(names, points, radius, height, links))
-    return FloorPlan(WIDTH, height, radius, tuple(points), tuple(links), labels)
+    labels = [*_labels(names, points, radius, height, links)]
+    sizes = {"width": WIDTH, "height": height, "radius": radius}
+    return {**sizes, "points": points, "links": links, "labels": labels}
 
 
 def _labels(
@@ -230,8 +209,11 @@ def _labels(
     radius: float,
     height: float,
     links: Sequence[tuple[int, int]],
-) -> Iterable[Label]:
-    """Each name where it crosses the fewest links, on nothing else that is drawn."""
+) -> Iterable[dict[str, Any]]:
+    """Each name where it crosses the fewest links, on nothing else that is drawn.
+
+    With its ``anchor`` (start, middle or end) at a point.
+    """
     taken: list[_Box] = [(x - radius, y - radius, x + radius, y + radius) for x, y in points]
     for place in sorted(range(len(names)), key=lambda p: bool(_NUMBERED.fullmatch(names[p]))):
         (x, y), wide, gap = points[place], _LETTER * len(names[place]), radius + 4
@@ -245,7 +227,8 @@ def _labels(
             box = left, base - _LINE + 3, left + wide, base + 3
             if _is_inside(box, height) and not any(_overlap(box, other) for other in taken):
                 crossed = sum(_crosses(box, points[a], points[b]) for a, b in links)
-                free.append((crossed, box, Label(names[place], at, base, anchor)))
+                label = {"text": names[place], "x": at, "y": base, "anchor": anchor}
+                free.append((crossed, box, label))
         if free:
             _, box, label = min(free, key=itemgetter(0))
             taken.append(box)
@@ -276,18 +259,20 @@ def drawn_plan(data: Mapping[str, Any], heat: Heat | None) -> dict[str, Any]:
     if not names:
         return {"plan": None, "names": (), "spoken": None, "heat": None}
     points = [(place["x"], place["y"]) for place in data["places"]]
-    plan = floor_plan(names, points, [(a, b) for a, b, *_ in data["links"]])
+    links = [(a, b) for a, b, *_ in data["links"]]
     # Few places: the words are shown as small maps, one in each place, as far as one can read them.
     are_many = len(names) > (_MOST_CELLS if data["grid"] else _MOST_BOXES)
     return {
-        "plan": plan,
+        "plan": floor_plan(names, points, links),
         "names": names,
-        "spoken": _spoken(data, names, plan) if data["pair"] and are_many else None,
-        "heat": heat_map(heat, names, plan.links) if heat and heat.most else None,
+        "spoken": _spoken(data, names, links) if data["pair"] and are_many else None,
+        "heat": heat_map(heat, names, links) if heat and heat.most else None,
     }
 
 
-def _spoken(data: Mapping[str, Any], names: Sequence[str], plan: FloorPlan) -> dict[str, Any]:
+def _spoken(
+    data: Mapping[str, Any], names: Sequence[str], links: Sequence[tuple[int, int]]
+) -> dict[str, Any]:
     """The words on a floor plan while the first thing is where it starts."""
     (one, two), start = data["pair"]["things"], data["pair"]["start"]
     spots = [{"look": "unmapped", "title": name, "text": ""} for name in names]
@@ -299,6 +284,6 @@ def _spoken(data: Mapping[str, Any], names: Sequence[str], plan: FloorPlan) -> d
             look = f"w c{word % 9}"
             spots[at[two]] |= {"look": look, "title": f"{names[at[two]]}: {name}", "text": name}
     spots[start]["look"] = "here"
-    lanes = [{"look": "passage", "title": f"{names[a]} – {names[b]}"} for a, b in plan.links]
+    lanes = [{"look": "passage", "title": f"{names[a]} – {names[b]}"} for a, b in links]
     who = {"one": data["things"][one], "two": data["things"][two], "start": start}
     return {**who, "spots": spots, "lanes": lanes}

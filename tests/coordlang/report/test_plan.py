@@ -25,19 +25,19 @@ def test_names_and_places_do_not_overlap() -> None:
         points = [(random.uniform(0, 90), random.uniform(-9, 30)) for _ in names]
         links = [(k, k + 1) for k in range(number - 1)]
         plan = floor_plan(names, points, links)
-        assert plan.links == tuple(links)
-        boxes = [(x - 4, y - 4, x + 4, y + 4) for x, y in plan.points]
-        for label in plan.labels:
-            wide = 6.4 * len(label.text)
-            left = label.x - {"start": 0, "middle": wide / 2, "end": wide}[label.anchor]
-            boxes.append((left, label.y - 10, left + wide, label.y + 3))
+        assert plan["links"] == links
+        boxes = [(x - 4, y - 4, x + 4, y + 4) for x, y in plan["points"]]
+        for label in plan["labels"]:
+            wide, y = 6.4 * len(label["text"]), label["y"]
+            left = label["x"] - {"start": 0, "middle": wide / 2, "end": wide}[label["anchor"]]
+            boxes.append((left, y - 10, left + wide, y + 3))
         named = boxes[number:]
-        assert all(a >= 0 and b >= 0 and c <= WIDTH and d <= plan.height for a, b, c, d in boxes)
+        assert all(a >= 0 and b >= 0 and c <= WIDTH and d <= plan["height"] for a, b, c, d in boxes)
         for one, other in combinations(boxes, 2):
             apart = one[2] <= other[0] or other[2] <= one[0]
             apart = apart or one[3] <= other[1] or other[3] <= one[1]
             assert apart or (one not in named and other not in named)
-        given = sum("_" in label.text for label in plan.labels)
+        given = sum("_" in label["text"] for label in plan["labels"])
         hidden += number - len(named)
         assert 2 * given + 1 >= len(named)  # names that somebody gave come first
     assert hidden
