@@ -9,7 +9,7 @@ agree in some arguments, the *key*: ``(at r2 a), (at r2 b), ..`` have the key ``
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations
 
@@ -110,11 +110,15 @@ def _surroundings(model: JointModel, rows: Rows) -> Rows:
 
 
 def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: bool) -> Variable:
+    there = {atoms[number].predicate for number in group.atoms}
+    keys = {p: _key_text(own, group.key) for p, own in sorted(group.family) if p in there}
+    # The predicates, each with its key, or the key once where it is the same.
+    is_one = len({*keys.values()}) == 1
+    name = "/".join(keys) + keys[min(keys)] if is_one else "/".join(map("".join, keys.items()))
     values = [atoms[number] for number in used]
-    texts = _texts(group, values, group.key)
+    texts = [*_texts(group, values, keys, group.key)]
     if len({*texts}) < len(texts):  # an action is called idle or none
-        texts = _texts(group, values, ())
-    name = _name(group, {atoms[number].predicate for number in group.atoms})
+        texts = [*_texts(group, values, keys, ())]
     if not none:
         return Variable(name, tuple(values), tuple(texts))
     is_object = any(value == "none" for _, value in texts)
@@ -122,24 +126,16 @@ def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: b
     return Variable(name, (*values, None), tuple(texts))
 
 
-def _texts(group: _Group, atoms: Sequence[Atom], key: Sequence[str]) -> list[tuple[str, str]]:
-    """For each atom its predicate with the group's key, and its other arguments (`_short`)."""
-    positions, found = dict(group.family), []
+def _texts(
+    group: _Group, atoms: Sequence[Atom], keys: Mapping[str, str], key: Sequence[str]
+) -> Iterator[tuple[str, str]]:
+    """For each atom its predicate with the text of its key, and its other arguments (`_short`)."""
+    positions = dict(group.family)
     for atom in atoms:
         own = positions[atom.predicate]
         others = [_short(key, arg) for place, arg in enumerate(atom.args) if place not in own]
-        value = ", ".join(others)
-        value = f"({value})" if len(others) > 1 else value
-        found.append((atom.predicate + _key_text(own, group.key), value))
-    return found
-
-
-def _name(group: _Group, predicates: Set[str]) -> str:
-    """The predicates, each with its key, or the key once where it is the same."""
-    keys = {p: _key_text(own, group.key) for p, own in sorted(group.family) if p in predicates}
-    if len({*keys.values()}) == 1:
-        return "/".join(keys) + keys.popitem()[1]
-    return "/".join(map("".join, keys.items()))
+        value = f"({', '.join(others)})" if len(others) > 1 else "".join(others)
+        yield atom.predicate + keys[atom.predicate], value
 
 
 def _key_text(positions: Sequence[int], key: Sequence[str]) -> str:

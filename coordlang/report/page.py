@@ -119,11 +119,11 @@ def word_rows(used: TaskLanguage, lifted: LiftedWords | None) -> tuple[list[dict
     ``examples``), and ``rest`` says that the formula is "every other state".  ``lifted`` has the
     formulas of words that are functions of features.
     """
-    terms_of, others, in_order = _terms_of_words(used, lifted)
+    described, in_order = _terms_of_words(used, lifted)
     language, sizes = used.language, used.language.sizes()
     largest = max([1, *sizes.values()])
     rows = []
-    for word, terms in terms_of.items():
+    for word, terms, is_rest in described:
         states = (key for key, own in language.states.items() if own == word)
         rows.append(
             {
@@ -132,7 +132,7 @@ def word_rows(used: TaskLanguage, lifted: LiftedWords | None) -> tuple[list[dict
                 "size": sizes[word],
                 "share": round(100 * sizes[word] / largest, 1),
                 "default": word == language.default,
-                "rest": word in others,
+                "rest": is_rest,
                 "terms": None if terms is None else list(terms[:_TERMS]),
                 "more_terms": max(0, len(terms or ()) - _TERMS),
                 "examples": [*islice(states, _EXAMPLES)] if terms is None else [],
@@ -143,18 +143,19 @@ def word_rows(used: TaskLanguage, lifted: LiftedWords | None) -> tuple[list[dict
 
 def _terms_of_words(
     used: TaskLanguage, lifted: LiftedWords | None
-) -> tuple[Mapping[str, Sequence[str] | None], Sequence[str], bool]:
-    """Terms by word (None: not sought), words that are "every other state", and if in order."""
+) -> tuple[list[tuple[str, Sequence[str] | None, bool]], bool]:
+    """Words with terms (None: not sought), which is "every other state", and if in order."""
     language = used.language
     if lifted:
-        return {word: lifted.terms.get(word, ()) for word in language.words}, (), False
+        return [(word, lifted.terms.get(word, ()), False) for word in language.words], False
     if not 0 < len(language.states) <= _STATES_EXPLAINED:
-        return dict.fromkeys(language.words), (), False
+        return [(word, None, False) for word in language.words], False
     mapped = mapped_states(used.partition, used.model)
-    described = describe_words(mapped, all_covers(mapped))
-    rules, in_order = described.rules, described.in_order
-    terms_of = {word: [*map(term_text, cover.terms)] if cover else [] for word, cover in rules}
-    return terms_of, [word for word, cover in rules if not cover], in_order
+    told = describe_words(mapped, all_covers(mapped))
+    rows: list[tuple[str, Sequence[str] | None, bool]] = []
+    for word, cover in told.rules:
+        rows.append((word, [*map(term_text, cover.terms if cover else ())], cover is None))
+    return rows, told.in_order
 
 
 def _map(world: World, known: Mapping[str, Point]) -> dict[str, Any]:
@@ -319,6 +320,9 @@ def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
     begin = "'use strict';\nconst DATA = JSON.parse(document.getElementById('data').textContent);"
     scripts = sorted((here / "script").glob("*.js"))
     template = environment.from_string((here / "template.html").read_text("utf-8"))
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False)
+    for sign in "<\u2028\u2029":  # which may not stand in a script element
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
     return template.render(
         version=version("coordlang"),
         terms_open=_TERMS_OPEN if len(shown["words"]) <= _FEW_WORDS else 1,
@@ -331,15 +335,9 @@ def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
         js=Markup("\n".join([begin, *(entry.read_text("utf-8") for entry in scripts)])),
         kept=data["kept"],
         checked=[task["verified"] for task in data["tasks"]],
-        data=Markup(_json(data)),
+        data=Markup(text),
         **shown,
     ).encode()
-
-
-def _json(data: Mapping[str, Any]) -> str:
-    """JSON that may stand in a script element."""
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False)
-    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 def _formula(text: str) -> Any:

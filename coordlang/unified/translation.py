@@ -12,7 +12,7 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement, count
+from itertools import chain, combinations_with_replacement, count
 from typing import Any, NamedTuple
 
 from unified_planning.model import InstantaneousAction, OperatorKind, Problem, Variable
@@ -178,9 +178,8 @@ class PddlNames:
         if (kind, thing) not in self._names:
             taken = self._taken.setdefault(kind, {*_RESERVED, "increase", "total-cost"})
             base = self.plain(text)
-            others = (f"{base}__{number}" for number in count(2))
-            name = next(n for n in others if n not in taken) if base in taken else base
-            self._names[kind, thing] = name
+            names = chain([base], (f"{base}__{number}" for number in count(2)))
+            name = self._names[kind, thing] = next(name for name in names if name not in taken)
             taken.add(name)
         return self._names[kind, thing]
 
