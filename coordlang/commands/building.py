@@ -292,12 +292,10 @@ class Making:
 
         Words that were not verified are none.
         """
+        partition = self.partition_of(found.partition)
+        none = found.partition, partition, Verdict(False, self.candidates.count, 0, None)
         of_found = (own for own in self.verified if own[0] is found.partition)
-        if (verified := next(of_found, None)) is not None:
-            _, partition, verdict = verified
-        else:
-            partition = self.partition_of(found.partition)
-            verdict = Verdict(False, self.candidates.count, 0, None)
+        _, partition, verdict = next(of_found, none)
         guarantee = Guarantee.of(method, len(partition.words), found.lower_bound, verdict.holds)
         provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
         if not verdict.holds:

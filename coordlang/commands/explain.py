@@ -112,10 +112,9 @@ class Explanation(InTask):
 
         Raises `OutOfMemory` beyond 100,000 sentences, or where it is too much work.
         """
-        used, words = self.used, self.used.partition.words
-        only = None if self.only is None else tuple(words[word] for word in self.only)
+        used, only = self.used, self.only
         found = task_sentences(used.space, used.task, used.partition, used.plans_with)
-        return tuple(sentence for sentence in found if only in (None, sentence.words))
+        return tuple(one for one in found if only is None or used.words_of(one.words) == only)
 
     def demands(self, sentences: Iterable[Sentence] | None = None) -> list[SentenceDemands]:
         """Return what sentences (word numbers; default: `sentences`) ask of each robot."""
