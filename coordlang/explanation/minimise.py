@@ -127,23 +127,17 @@ def expand(points: Points, seed: Bools, wanted: Ints) -> Bools:
     left = list(range(len(points.sizes)))
     while left:
         critical = out_off.sum(axis=1) == 1
-        opened = {v: _opened(points, box, v, critical & out_off[:, v]) for v in left}
+        # An ``off`` point has one value: what can be allowed one by one can be allowed together.
+        opened = {v: np.ones(points.sizes[v], np.bool_) for v in left}
+        for v, allowed in opened.items():
+            allowed[points.off[critical & out_off[:, v], v]] = False
+            allowed |= box[points.spans[v]]
         chosen = _most(opened, out_on, wanted)
         box[points.spans[chosen]] = opened[chosen]
         out_off[:, chosen] &= ~opened[chosen][points.off[:, chosen]]
         out_on[:, chosen] &= ~opened[chosen][wanted[:, chosen]]
         left.remove(chosen)
     return box
-
-
-def _opened(points: Points, box: Bools, variable: int, critical: Bools) -> Bools:
-    """The values of a variable that can be allowed: not those that alone keep an ``off`` point out.
-
-    Each ``off`` point has one value, so what can be allowed one by one can be allowed together.
-    """
-    free = np.ones(points.sizes[variable], np.bool_)
-    free[points.off[critical, variable]] = False
-    return np.asarray(free | box[points.spans[variable]])
 
 
 def _most(opened: Mapping[int, Bools], out: Bools, wanted: Ints) -> int:
