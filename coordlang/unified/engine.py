@@ -39,7 +39,7 @@ from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.unified import NAME
-from coordlang.unified.plans import NoSteps, leaves_steps_open, of_up, to_up
+from coordlang.unified.plans import Invalid, leaves_steps_open, of_up, to_up
 from coordlang.unified.translation import FEATURES, Concurrency, Subactions, Translated, translate
 from planners.check.rules import Verdict, validate
 from planners.grounding.actions import idling_schemas
@@ -367,12 +367,13 @@ class CoordlangEngine(up.Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanV
                 verdict = validate(
                     found.domain, found.problem, loaded.team, texts, joint_actions=names
                 )
-                if not verdict.valid:
-                    return self._refuted(verdict, steps)
-                if wrong_sentence := self._wrong_sentence(found, texts):
-                    return self._invalid(wrong_sentence, None)
-        except NoSteps as error:
-            return self._invalid(str(error), error.reason, error.action)
+                is_plan = verdict.valid
+                wrong = self._other_sentence(found, texts) if is_plan else _refuted(verdict, steps)
+            if wrong is not None:
+                raise wrong
+        except Invalid as error:
+            no, why = Validity.INVALID, [LogMessage(LogLevel.INFO, str(error))]
+            return up.ValidationResult(no, self.name, why, None, error.reason, error.action)
         except Unsupported as error:
             raise UPUnsupportedProblemTypeError(in_parameters(error)) from error
         except CoordlangError as error:
@@ -382,16 +383,7 @@ class CoordlangEngine(up.Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanV
             messages.append(_warning(_OPEN))
         return up.ValidationResult(Validity.VALID, self.name, messages, metrics=metrics)
 
-    def _refuted(self, verdict: Verdict, steps: Sequence[Any]) -> up.ValidationResult:
-        """What an invalid plan breaks: the rules in a step of `of_up`, or the goal at the end."""
-        assert verdict.step is not None
-        if verdict.step == len(steps):
-            return self._invalid(verdict.reason, Reason.UNSATISFIED_GOALS)
-        _, actions = steps[verdict.step]
-        why = f"step {verdict.step + 1}: {verdict.reason}"
-        return self._invalid(why, Reason.INAPPLICABLE_ACTION, next(iter(actions.values()), None))
-
-    def _wrong_sentence(self, found: Translated, plan: Sequence[Texts]) -> str | None:
+    def _other_sentence(self, found: Translated, plan: Sequence[Texts]) -> Invalid | None:
         """Why a plan has another sentence than the one given, or none; None if all is well."""
         if self._options.sentence is None:
             return None
@@ -405,19 +397,19 @@ class CoordlangEngine(up.Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanV
         try:
             words = sentence_of_plan(task_language, acting)
         except (NotAPlan, NotOptimal) as error:
-            return in_parameters(error)
-        if words == wanted:
-            return None
-        return f'the sentence of this plan is "{task_language.text(words)}"'
+            return Invalid(in_parameters(error))
+        said = f'the sentence of this plan is "{task_language.text(words)}"'
+        return None if words == wanted else Invalid(said)
 
-    def _invalid(self, why: str, reason: Reason | None, action: Any = None) -> up.ValidationResult:
-        return up.ValidationResult(
-            Validity.INVALID,
-            self.name,
-            [LogMessage(LogLevel.INFO, why)],
-            reason=reason,
-            inapplicable_action=action,
-        )
+
+def _refuted(verdict: Verdict, steps: Sequence[Any]) -> Invalid:
+    """What an invalid plan breaks: the rules in a step of `of_up`, or the goal at the end."""
+    assert verdict.step is not None
+    if verdict.step == len(steps):
+        return Invalid(verdict.reason, Reason.UNSATISFIED_GOALS)
+    _, actions = steps[verdict.step]
+    why = f"step {verdict.step + 1}: {verdict.reason}"
+    return Invalid(why, Reason.INAPPLICABLE_ACTION, next(iter(actions.values()), None))
 
 
 @contextmanager

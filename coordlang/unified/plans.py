@@ -27,17 +27,15 @@ from planners.search.plans import Plan, Plans, Texts
 from planners.system.errors import UsageError
 
 
-class NoSteps(Exception):
-    """A plan that is no sequence of joint steps of the problem.
+class Invalid(Exception):
+    """Why a plan is none of the problem, in unified-planning's words its ``reason``, if any.
 
-    Because of ``action``, which is none of the problem's; or, where this is None, because a robot
-    does two things at once or the order has a cycle.  ``reason`` is what unified-planning calls it.
+    ``action`` is the one that cannot be done, None where it is not one alone.
     """
 
-    def __init__(self, why: str, action: Any = None) -> None:
+    def __init__(self, why: str, reason: Reason | None = None, action: Any = None) -> None:
         super().__init__(why)
-        self.action = action
-        self.reason = Reason.INAPPLICABLE_ACTION if action else Reason.MUTEX_CONFLICT
+        self.reason, self.action = reason, action
 
 
 def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: Any) -> Any:
@@ -70,7 +68,7 @@ def of_up(
     """The joint steps of a unified-planning plan: what each robot does, and the actions by text.
 
     A partial-order plan is read layer by layer, each action as early as its predecessors allow.
-    Raises `NoSteps`, and `UsageError` for a plan of another kind.
+    Raises `Invalid`, and `UsageError` for a plan of another kind.
     """
     result = []
     for actions in _steps(plan):
@@ -79,9 +77,8 @@ def of_up(
         for text, action in named:
             for robot, part in _parts(model, team, found, text, action):
                 if step[robot] is not None:
-                    raise NoSteps(
-                        f"{model.robots[robot]} does {step[robot]} and {part} in one step"
-                    )
+                    why = f"{model.robots[robot]} does {step[robot]} and {part} in one step"
+                    raise Invalid(why, Reason.MUTEX_CONFLICT)
                 step[robot] = part
         result.append((tuple(step), dict(named)))
     return result
@@ -104,7 +101,8 @@ def _steps(plan: Any) -> Sequence[Sequence[Any]]:
         steps: dict[Any, list[Any]] = defaultdict(list)
         for start, action, duration in plan.timed_actions:
             if duration is not None:
-                raise NoSteps(f"{action} has a duration, and actions here have none", action)
+                why = f"{action} has a duration, and actions here have none"
+                raise Invalid(why, Reason.INAPPLICABLE_ACTION, action)
             steps[start].append(action)
         return [steps[start] for start in sorted(steps)]
     if not isinstance(plan, up.PartialOrderPlan):
@@ -114,14 +112,14 @@ def _steps(plan: Any) -> Sequence[Sequence[Any]]:
         )
     order = networkx.DiGraph(plan.get_adjacency_list)
     if not networkx.is_directed_acyclic_graph(order):
-        raise NoSteps("the order of the plan's actions has a cycle")
+        raise Invalid("the order of the plan's actions has a cycle", Reason.MUTEX_CONFLICT)
     return list(networkx.topological_generations(order))
 
 
 def label(found: Translated, action: Any) -> str:
     """The ground action that an action instance stands for, as PDDL text.
 
-    Raises `NoSteps` for an action that is none of the problem's.
+    Raises `Invalid` for an action that is none of the problem's.
     """
     agents = {own.name: name for name, own in found.agents.items()}
     agent = action.agent and agents.get(action.agent.name)
@@ -130,7 +128,8 @@ def label(found: Translated, action: Any) -> str:
     values = [v.object() if v.is_object_exp() else None for v in action.actual_parameters]
     words = [next(schemas, None), *([agent] if action.agent else []), *map(names.get, values)]
     if None in words:
-        raise NoSteps(f"{action} is no action of the problem", action)
+        why = f"{action} is no action of the problem"
+        raise Invalid(why, Reason.INAPPLICABLE_ACTION, action)
     return f"({' '.join(map(str, words))})"
 
 
@@ -139,7 +138,7 @@ def _parts(
 ) -> list[tuple[int, str | None]]:
     """The robots that take part in an action, by its text, with their parts.
 
-    Raises `NoSteps` for a joint action that is never possible.
+    Raises `Invalid` for a joint action that is never possible.
     """
     if not model.is_joint_action:
         name, *args = text[1:-1].split()
@@ -147,5 +146,5 @@ def _parts(
         return [(robot, text) for robot in team.owners(schemas[name], tuple(args))]
     ground = next((ground for ground in model.actions if ground.label == text), None)
     if ground is None:
-        raise NoSteps(f"{action} is never possible", action)
+        raise Invalid(f"{action} is never possible", Reason.INAPPLICABLE_ACTION, action)
     return [(robot, part) for robot, part in enumerate(ground.parts) if part is not None]
