@@ -67,10 +67,9 @@ class _Search:
         variables, value = valuation(job.candidates.model, job.candidates.rows[list(job.states)])
         self._value = dict(zip(job.states, value, strict=True))
         self._sizes = [len(variable.values) for variable in variables]
-        word = np.array([found.partition[state] for state in job.states], np.int64)
-        names, word = np.unique(word, return_inverse=True)
-        words = tuple(f"w{name}" for name in names)
-        mapped = MappedStates(words, variables, value, word)
+        words = [found.partition[state] for state in job.states]
+        names, word = np.unique(words, return_inverse=True)
+        mapped = MappedStates(tuple(map(str, names)), variables, value, word)
         # The word with the longest formula is "every other state".
         covers = all_covers(mapped).values()
         lengths = sorted((len(f.terms), sum(map(len, f.terms))) for f in covers)[:-1]

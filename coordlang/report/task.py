@@ -359,14 +359,9 @@ def task_summary(language: TaskLanguage, world: World) -> dict[str, Any]:
 
 def _title(starts: Mapping[str, str], goals: Mapping[str, str], others: list[str]) -> str:
     """What is to be done: what moves where, what else becomes true; else what comes back."""
-    moves, arrivals, stays = [], [], []
-    for thing, place in goals.items():
-        if thing not in starts:
-            arrivals.append(f"{thing} at {place}")
-        elif starts[thing] != place:
-            moves.append(f"{thing} {starts[thing]} → {place}")
-        else:
-            stays.append(f"{thing} back at {place}")
+    moves = [f"{t} {starts[t]} → {p}" for t, p in goals.items() if starts.get(t, p) != p]
+    arrivals = [f"{t} at {p}" for t, p in goals.items() if t not in starts]
+    stays = [f"{t} back at {p}" for t, p in goals.items()]  # if nothing else is to be done
     plain = [text.strip("()") if text.count("(") == 1 else text for text in others]
     return ", ".join([*moves, *arrivals, *plain] or stays) or "nothing to do"
 
