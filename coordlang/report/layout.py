@@ -30,7 +30,7 @@ def place_layout(
     down, neighbours are about 1 apart.
     """
     points = known if known.keys() >= set(names) else from_names(names, links)
-    if points:
+    if names and points:
         found = {name: points[name] for name in names}
         return found, _is_grid(list(found.values()))
     number = {name: k for k, name in enumerate(names)}

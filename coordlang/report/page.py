@@ -159,8 +159,6 @@ def _terms_of_words(
 
 
 def _map(world: World, known: Mapping[str, Point]) -> dict[str, Any]:
-    if not world.places:
-        return {"places": [], "links": [], "grid": False}
     placed, is_grid = place_layout(world.places, [link.ends for link in world.links], known)
     number = {name: k for k, name in enumerate(world.places)}
     return {

@@ -256,14 +256,12 @@ def drawn_plan(data: Mapping[str, Any], heat: Heat | None) -> dict[str, Any]:
     None for words that are shown as small maps or on no map, and where no robot is torn.
     """
     names = [place["name"] for place in data["places"]]
-    if not names:
-        return {"plan": None, "names": (), "spoken": None, "heat": None}
     points = [(place["x"], place["y"]) for place in data["places"]]
     links = [(a, b) for a, b, *_ in data["links"]]
     # Few places: the words are shown as small maps, one in each place, as far as one can read them.
     are_many = len(names) > (_MOST_CELLS if data["grid"] else _MOST_BOXES)
     return {
-        "plan": floor_plan(names, points, links),
+        "plan": floor_plan(names, points, links) if names else None,
         "names": names,
         "spoken": _spoken(data, names, links) if data["pair"] and are_many else None,
         "heat": heat_map(heat, names, links) if heat and heat.most else None,
