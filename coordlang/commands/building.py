@@ -292,10 +292,11 @@ class Making:
 
         Words that were not verified are none.
         """
-        partition = self.partition_of(found.partition)
-        none = found.partition, partition, Verdict(False, self.candidates.count, 0, None)
-        of_found = (own for own in self.verified if own[0] is found.partition)
-        _, partition, verdict = next(of_found, none)
+        known = [own for own in self.verified if own[0] is found.partition]
+        if not known:
+            none = Verdict(False, self.candidates.count, 0, None)
+            known = [(found.partition, self.partition_of(found.partition), none)]
+        _, partition, verdict = known[0]
         guarantee = Guarantee.of(method, len(partition.words), found.lower_bound, verdict.holds)
         provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
         if not verdict.holds:
