@@ -129,11 +129,15 @@ def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: b
 def _texts(
     group: _Group, atoms: Sequence[Atom], keys: Mapping[str, str], key: Sequence[str]
 ) -> Iterator[tuple[str, str]]:
-    """For each atom its predicate with the text of its key, and its other arguments (`_short`)."""
+    """For each atom its predicate with the text of its key, and its other arguments.
+
+    A remembered subaction stands there as the robot of the ``key`` says it of itself.
+    """
     positions = dict(group.family)
     for atom in atoms:
         own = positions[atom.predicate]
-        others = [_short(key, arg) for place, arg in enumerate(atom.args) if place not in own]
+        free = (arg for place, arg in enumerate(atom.args) if place not in own)
+        others = [own_text(arg, key[0]) if key else arg for arg in free]
         value = f"({', '.join(others)})" if len(others) > 1 else "".join(others)
         yield atom.predicate + keys[atom.predicate], value
 
@@ -143,11 +147,6 @@ def _key_text(positions: Sequence[int], key: Sequence[str]) -> str:
     place = dict(zip(positions, key, strict=True))
     shown = (place.get(position, "?") for position in range(max(positions, default=-1) + 1))
     return f"({', '.join(shown)})" if key else ""
-
-
-def _short(key: Sequence[str], argument: str) -> str:
-    """An argument; a remembered subaction as the robot of the key says it of itself."""
-    return own_text(argument, key[0]) if key and argument.startswith("(") else argument
 
 
 # ---- mutex groups
