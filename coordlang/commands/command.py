@@ -15,7 +15,7 @@ from typing import Any, get_args, get_origin
 
 import click
 
-from coordlang.commands.records import CommandOptions, Jobs, Limits, Source
+from coordlang.commands.records import CommandOptions, Jobs, Limits, OutputFile, Source
 from coordlang.commands.terminal import SAYING, echo, working
 from planners.system.errors import CoordlangError, OutOfTime, UsageError, note
 from planners.system.limits import default_memory_limit, limited_memory, require_memory, time_limit
@@ -31,8 +31,6 @@ _EXAMPLES = {
     "GRID": "domains/grid/domain.pddl domains/grid/gw1-2x2.pddl",
     "SITE": "domains/t-map/t-map.map domains/t-map/t-map.scen",
 }
-#: An output: the option that names it, its path, and whether its folder is made if it is missing.
-Output = tuple[str, str, bool]
 #: The name of a file: shells complete it, and nothing is checked yet.
 FILE = click.Path(readable=False)
 
@@ -172,12 +170,12 @@ def _said(resume: object) -> Iterator[None]:
 
 def _files(
     arguments: tuple[str, ...], given: Iterable[tuple[Option, object]], options: CommandOptions
-) -> tuple[list[Output], list[str]]:
+) -> tuple[list[OutputFile], list[str]]:
     """The files that options name, or that are written into a folder that one names; and others.
 
     These no output may overwrite: arguments, what is read beside them, those of options.
     """
-    outputs: list[Output] = []
+    outputs: list[OutputFile] = []
     folders = {os.path.dirname(path) for path in arguments}
     read = [*arguments, *(os.path.join(each, "coordinates.json") for each in sorted(folders))]
     makes_folder = getattr(options, "writes_folder", True)
@@ -192,19 +190,19 @@ def _files(
     return outputs, read
 
 
-def _outputs(option: Option, paths: list[str], files: Sequence[str]) -> Iterator[Output]:
+def _outputs(option: Option, paths: list[str], files: Sequence[str]) -> Iterator[OutputFile]:
     """The files of an option that names files, or folders for some ``files``; stdout is none."""
     for number, path in enumerate(paths, 1):
         spelling = option.spelling if len(paths) == 1 else f"{option.spelling} {number}"
         if option.name != "output" and path == "-":
             raise UsageError(f"{spelling} -: this cannot go to stdout", remedy="Name a file.")
         if not files and path != "-":
-            yield spelling, path, False
+            yield OutputFile(spelling, path)
         for file in files:
-            yield spelling, os.path.join(path, file) if path else "", True
+            yield OutputFile(spelling, os.path.join(path, file) if path else "", makes_folder=True)
 
 
-def check_outputs(outputs: Iterable[Output], inputs: Iterable[str]) -> None:
+def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
     """Refuse outputs that cannot be written, or overwrite an input file or one another.
 
     Before the work, not after it.  Raises `UsageError`.
@@ -215,7 +213,7 @@ def check_outputs(outputs: Iterable[Output], inputs: Iterable[str]) -> None:
         _check_output(output, read, written)
 
 
-def _check_output(output: Output, read: Iterable[str], written: dict[str, str]) -> None:
+def _check_output(output: OutputFile, read: Iterable[str], written: dict[str, str]) -> None:
     """Check one output, and enter what it takes in ``written``, the options by their files."""
     from planners.system.writing import is_device, why_unwritable
 

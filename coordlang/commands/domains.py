@@ -13,7 +13,7 @@ from pathlib import Path
 
 from coordlang.commands.command import check_outputs
 from coordlang.commands.inputs import Arguments, public
-from coordlang.commands.records import DomainsOptions, ImportOptions, TasksOptions
+from coordlang.commands.records import DomainsOptions, ImportOptions, OutputFile, TasksOptions
 from coordlang.commands.terminal import echo, write
 from coordlang.language.listed import ListedTask, tasks_text, varied_tasks
 from coordlang.sites import about, shipped_domains
@@ -39,7 +39,7 @@ def domains(_: Arguments, options: DomainsOptions) -> list[str]:
         if os.path.lexists(path):
             remedy = "Remove it, or name another folder."
             raise UsageError(f"{path} is there already", remedy=remedy)
-        check_outputs([("--copy", path, True)], [])
+        check_outputs([OutputFile("--copy", path, makes_folder=True)], [])
     copy_folders([shipped / name for name in names], target)
     return names
 
@@ -106,7 +106,7 @@ class ImportedSite(Presented):
         Raises `UsageError` if one is there that says something else: nothing is written over.
         """
         paths = {name: os.path.join(folder, name) for name in self.texts}
-        check_outputs([("-o", path, True) for path in paths.values()], ())
+        check_outputs([OutputFile("-o", path, True) for path in paths.values()], ())
         for name, path in paths.items():
             with suppress(OSError):
                 if Path(path).read_bytes() == self.texts[name].encode():

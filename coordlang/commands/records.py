@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union, dataclass_transform
 
 import click
 
@@ -54,6 +54,17 @@ DEFAULT_MAX = 10
 
 #: The files of a domain and a problem that are written.
 WRITTEN = ("domain.pddl", "problem.pddl")
+
+
+class OutputFile(NamedTuple):
+    """A file that is written, and the option that names it; ``-`` is stdout and not looked at.
+
+    ``makes_folder``: its folder is made where it is missing.
+    """
+
+    option: str
+    path: str
+    makes_folder: bool = False
 
 
 @dataclass(frozen=True, slots=True)

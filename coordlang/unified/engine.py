@@ -372,8 +372,13 @@ class CoordlangEngine(up.Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanV
             if wrong is not None:
                 raise wrong
         except Invalid as error:
-            no, why = Validity.INVALID, [LogMessage(LogLevel.INFO, str(error))]
-            return up.ValidationResult(no, self.name, why, None, error.reason, error.action)
+            return up.ValidationResult(
+                Validity.INVALID,
+                self.name,
+                [LogMessage(LogLevel.INFO, str(error))],
+                reason=error.reason,
+                inapplicable_action=error.action,
+            )
         except Unsupported as error:
             raise UPUnsupportedProblemTypeError(in_parameters(error)) from error
         except CoordlangError as error:
