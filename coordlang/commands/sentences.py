@@ -20,6 +20,7 @@ from coordlang.execution.plan_sentence import PlanDag, sentence_of_plan
 from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
+from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import json_count, read_plans
 from planners.search.plans import Plans, Texts, texts
 from planners.system.errors import CoordlangError, UsageError
@@ -232,13 +233,14 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     preferences = [read_preference(used, text) for text in wishes_in(options.prefer)]
     best = best_sentence(used, preferences) if preferences else None
     words = best.words if best else used.words_of(sentence or ())
-    found = plan_under_sentence(used, words)
+    bound = HEURISTICS[_BOUND]
+    found = plan_under_sentence(used, words, bound)
     return PlanUnderSentence(
         used,
         used.text(words),
         texts(used.model.in_step, found.plan),
         found,
-        plan_under_sentence(used, None),
+        plan_under_sentence(used, None, bound),
         tuple(_fulfilled(preferences, best.values)) if best else (),
         SentencePlans(used, words),
     )
