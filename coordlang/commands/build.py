@@ -26,7 +26,7 @@ from coordlang.commands.terminal import (
     working,
 )
 from coordlang.language.candidates import Candidates
-from coordlang.language.file import to_bytes
+from coordlang.language.file import to_bytes, write_language
 from coordlang.language.recorded import check_domain, with_recorded
 from coordlang.language.words import Language
 from coordlang.required.task_answers import requiring
@@ -37,7 +37,7 @@ from planners.system.errors import OutOfTime, ProvedImpossible, UsageError
 from planners.system.limits import run_until_stopped, start_clock, stop_clock, time_left
 from planners.system.messages import counted, visible
 from planners.system.signals import Postponed, postponed_signals
-from planners.system.writing import is_device, remove_file, write_compressed
+from planners.system.writing import is_device, remove_file
 
 #: Share of the time that a search leaves for its certificate.
 _FOR_CERTIFICATE = 0.25
@@ -172,7 +172,7 @@ def _save(built: Built, output: str, certificate: str | None) -> None:
         remove_file(certificate)
         echo(to_bytes(built.language).decode(), nl=False)
     else:
-        write_compressed(output, to_bytes(built.language), level=6, outdated=certificate)
+        write_language(built.language, output, outdated=certificate)
 
 
 def _write_certificate(built: Built, proof: Certificate, output: str, path: str) -> None:

@@ -21,6 +21,7 @@ from planners.pddl.model_options import Cost, Execution, Unowned
 from planners.system.errors import BadInput, Position
 from planners.system.files import FileFormat, doc, read_bytes, require_seen
 from planners.system.messages import echoed
+from planners.system.writing import write_compressed
 
 # What JSON Schema can say and the reader checks with messages of its own.
 _SOME = {"minItems": 1, "uniqueItems": True}
@@ -211,6 +212,17 @@ def to_data(language: Language) -> dict[str, Any]:
 def to_bytes(language: Language) -> bytes:
     """The text of a language file: the same language gives the same bytes."""
     return msgspec.json.format(msgspec.json.encode(to_data(language)), indent=1) + b"\n"
+
+
+def write_language(
+    language: Language, path: str | Path, *, outdated: str | Path | None = None
+) -> None:
+    """Write a language file (gzip for ``.gz``).  The file is complete or not there at all.
+
+    ``outdated`` belongs to the language of before, as its certificate does: it is removed before
+    the new language stands there.
+    """
+    write_compressed(path, to_bytes(language), level=6, outdated=outdated)
 
 
 def read_language(path: str | Path) -> Language:

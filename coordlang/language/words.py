@@ -17,7 +17,6 @@ from planners.joint.states import StateCodec
 from planners.joint.tables import Ints, Rows, find_rows, unique_rows
 from planners.system.errors import BadInput
 from planners.system.messages import Presented, echoed
-from planners.system.writing import write_compressed
 
 
 def read_key(codec: StateCodec, key: str) -> Rows:
@@ -145,9 +144,9 @@ class Language(Presented):
 
         Raises `UsageError` where the path cannot be written.
         """
-        from coordlang.language.file import to_bytes  # the file format builds on this module
+        from coordlang.language.file import write_language  # the file format builds on this module
 
-        write_compressed(fspath(path), to_bytes(self), level=6)
+        write_language(self, fspath(path))
 
     def summary(self) -> dict[str, object]:
         """The numbers of words and states, and what is known of them: there may be millions."""
