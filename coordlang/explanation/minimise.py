@@ -165,15 +165,18 @@ def _irredundant(points: Points, pool: Bools) -> Bools:
     held = points.inside(pool, points.on)
     limited = (~pool).sum(axis=1)
     left = np.ones(len(points.on), np.bool_)
+    gain = held.sum(axis=1)
     chosen: list[int] = []
     while left.any():
-        gain = held[:, left].sum(axis=1)
         chosen.append(int(np.lexsort((limited, -gain))[0]))  # of equal gain the least limited
-        left &= ~held[chosen[-1]]
-    for number in reversed(chosen):
-        others = [other for other in chosen if other != number]
-        if held[others].any(axis=0).all():
-            chosen = others
+        taken = held[chosen[-1]] & left
+        gain = gain - held[:, taken].sum(axis=1)
+        left &= ~taken
+    times = held[chosen].sum(axis=0)
+    for number in reversed(chosen.copy()):
+        if (times[held[number]] > 1).all():
+            times -= held[number]
+            chosen.remove(number)
     return np.asarray(pool[chosen])
 
 
