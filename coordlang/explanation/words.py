@@ -209,6 +209,8 @@ class WordDescriptions:
 def describe_words(mapped: MappedStates, formulas: dict[str, Cover]) -> WordDescriptions:
     """The shorter way to describe the words."""
     apart = WordDescriptions(tuple(formulas.items()), False)
+    if len(formulas) < 2:
+        return apart
     # The longest formula, if it mentions more than one value, is "every other state".
     longest = max(formulas, key=lambda word: (formulas[word].length, formulas[word].states))
     if formulas[longest].length > 1:

@@ -19,7 +19,13 @@ from planners.joint.tables import Ints, Rows
 from planners.parallel.batch import digest
 from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import model_digest
-from planners.search.optimal_plans import distances_to, plan_space, plan_spaces, seen_rows
+from planners.search.optimal_plans import (
+    distances,
+    distances_to,
+    plan_space,
+    plan_spaces,
+    seen_rows,
+)
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, Space
 from planners.system.errors import OutOfMemory
@@ -94,7 +100,7 @@ class Explored:
         """How many there are: pairs of a goal and another state that reaches it, for None."""
         listed = sum(len(inits) for _, inits in self.goals if inits is not None)
         free = [goal for goal, inits in self.goals if inits is None]
-        return listed + sum(int((far > 0).sum()) for far in distances_to(self.space, free))
+        return listed + _pairs(self.space, free)
 
     @property
     def identity(self) -> str:
@@ -227,6 +233,26 @@ def require_room(source: Source) -> None:
             f"{left / 2**30:,.1f} GiB are left",
             remedy=f"Use --method greedy, fewer candidate tasks, or {more_memory()}.",
         )
+
+
+def _pairs(space: Space, goals: Sequence[Goal]) -> int:
+    """How many pairs there are of a goal and a state that reaches it in one step or more."""
+    if not goals:
+        return 0
+    full = all(isinstance(goal, FullState) for goal in goals)
+    if full and space.model.holds(goals[0], space.rows).sum() == 1 and _is_connected(space):
+        return len(goals) * (len(space) - 1)
+    return sum(int((far > 0).sum()) for far in distances_to(space, goals))
+
+
+def _is_connected(space: Space) -> bool:
+    """Whether every state leads to every other one; O(joint steps) for each step between them."""
+    first = np.arange(len(space)) == 0
+    reached, sources, before = first.copy(), space.sources, 0
+    while (count := int(reached.sum())) > before:
+        before = count
+        reached[space.target[reached[sources]]] = True
+    return count == len(space) and bool((distances(space, first[None]) >= 0).all())
 
 
 def _of_model(model: JointModel) -> tuple[object, ...]:
