@@ -176,7 +176,7 @@ def _action(text: str) -> ET.Element:
 
 
 def _models(trees: ET.Element, leaves: Mapping[str, _Leaf]) -> ET.Element:
-    """The ports of all leaves, which editors of trees ask for."""
+    """The ports of all leaves, which editors of trees ask for; actions have their own names yet."""
     found = ET.Element("TreeNodesModel")
     found.extend(_leaf_model(one.kind, name, one.ports) for name, one in leaves.items())
     ports: dict[str, list[str]] = {}

@@ -122,6 +122,8 @@ def test_jobs_without_a_common_step_are_those_of_one_model() -> None:
         world = loaded(text, task, ModelOptions(asynchronous=True))
         space = explore(world.model, world.tasks[0].init[None, :])
         found.add(Explored(space, [(world.tasks[0].goal, None)]).identity)
+        every = [(world.model.full_state(row), None) for row in space.rows]
+        assert Explored(space, every).tasks == 3 + 1 + 1, "what is done is never undone"
     assert len(found) == 2
 
 
