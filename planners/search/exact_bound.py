@@ -313,16 +313,11 @@ def _costly(
 
 
 def _disjoint(plans: FixedPlans, assumed: set[int]) -> Iterator[Literals]:
-    """Cores without a common literal, until what is assumed besides holds or is not soon refuted.
-
-    None, if what is assumed holds.
-    """
-    holds: bool | None = plans.holds([-literal for literal in sorted(assumed)])
-    while holds is False:
+    """Cores without a common literal, until what is assumed besides holds."""
+    while not plans.holds([-literal for literal in sorted(assumed)]):
         core = plans.core(assumed)
         assumed -= set(core)
         yield core
-        holds = plans.soon_holds([-literal for literal in sorted(assumed)])
 
 
 def _kinds(model: JointModel, task: PlanningTask) -> list[str]:

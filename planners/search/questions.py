@@ -149,18 +149,13 @@ class FixedPlans:
 
     def holds(self, literals: Sequence[int] = ()) -> bool:
         """Whether the formula holds with these literals."""
-        while (answer := self.soon_holds(literals)) is None:
-            pass
-        return answer
-
-    def soon_holds(self, literals: Sequence[int] = ()) -> bool | None:
-        """The same; None where it is not decided soon."""
         self.calls += 1
-        effort = max(1, min(_SLICE, self.left))
-        answer = solve_slice(self._solver, effort, literals)
-        if answer is None:
+        while True:
+            effort = max(1, min(_SLICE, self.left))
+            answer = solve_slice(self._solver, effort, literals)
+            if answer is not None:
+                return answer
             self.spend(effort)
-        return answer
 
     def excluded(self, literals: Sequence[int]) -> Ints:
         """Variables that are false where these literals hold, as far as unit propagation sees it.
