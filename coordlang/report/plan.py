@@ -198,9 +198,14 @@ def floor_plan(
     nearest = min((math.dist(a, b) for a, b in combinations(points, 2)), default=math.inf)
     radius = round(min(max(0.42 * nearest, _RADII[0]), _RADII[1]), 1)
     height = round(2 * _AROUND + scale * (bottom - top), 1)
-    labels = [*_labels(names, points, radius, height, links)]
-    sizes = {"width": WIDTH, "height": height, "radius": radius}
-    return {**sizes, "points": points, "links": links, "labels": labels}
+    return {
+        "width": WIDTH,
+        "height": height,
+        "radius": radius,
+        "points": points,
+        "links": links,
+        "labels": [*_labels(names, points, radius, height, links)],
+    }
 
 
 def _labels(

@@ -369,20 +369,20 @@ class CoordlangEngine(up.Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanV
                 )
                 is_plan = verdict.valid
                 wrong = self._other_sentence(found, texts) if is_plan else _refuted(verdict, steps)
-            if wrong is not None:
-                raise wrong
         except Invalid as error:
-            return up.ValidationResult(
-                Validity.INVALID,
-                self.name,
-                [LogMessage(LogLevel.INFO, str(error))],
-                reason=error.reason,
-                inapplicable_action=error.action,
-            )
+            wrong = error
         except Unsupported as error:
             raise UPUnsupportedProblemTypeError(in_parameters(error)) from error
         except CoordlangError as error:
             raise UPUsageError(in_parameters(error)) from error
+        if wrong is not None:
+            return up.ValidationResult(
+                Validity.INVALID,
+                self.name,
+                [LogMessage(LogLevel.INFO, str(wrong))],
+                reason=wrong.reason,
+                inapplicable_action=wrong.action,
+            )
         metrics = {"makespan": str(len(steps))}
         if leaves_steps_open(plan):
             messages.append(_warning(_OPEN))
