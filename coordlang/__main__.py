@@ -18,8 +18,8 @@ from planners.system.signals import Interruptions
 _DIGITS = 100_000
 
 #: New containers after which Python looks for garbage in cycles (700 if nothing is said): modules,
-#: ground actions and tables make many that stay, and hardly a cycle.
-_CONTAINERS = 50_000
+#: ground actions and tables make many that stay, and hardly a cycle (55,000 for the smallest task).
+_CONTAINERS = 100_000
 
 #: The exit code on a system that coordlang does not run on: that of what it relies on.
 _NOT_HERE = 32
