@@ -132,6 +132,8 @@ class MinimalSearch:
         self._merging: tuple[Assignment | None, Iterator[Assignment]] = None, iter(())
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
+        #: The language that was found last among all partitions.
+        self._found: Assignment | None = None
         self.refuting: Mapping[Clause, Evidence] = {}
 
     @cached_property
@@ -194,7 +196,7 @@ class MinimalSearch:
         self.merge(_VAIN)
         known = self.best
         close_bounds(self._bounds, self._narrow, lambda: self._is_spent)
-        if self.best is known and not self._is_spent:
+        if self.best is known and known is not self._found and not self._is_spent:
             # Merged words tell more states apart than a language must: fewer leave more plans open.
             self.decide(self.lower, Budget())
 
@@ -344,6 +346,7 @@ class MinimalSearch:
         if found is None:
             return dict(self.languages.evidence) if way == self._by_clauses else {}
         self._offer(found)
+        self._found = found
         self.merge(_VAIN)
         return None
 
