@@ -308,13 +308,13 @@ class MinimalSearch:
 
     def decide(self, size: int, budget: Budget) -> bool:
         """Find a language of ``size`` words, or prove that there is none; False: not yet."""
-        is_last = size == self.lower == self.upper - 1
-        ties_first = not self._is_one_task and (is_last or size > self.lower)
+        ties_first = size > self.lower and not self._is_one_task
         if ties_first and self._finds_tied(size, budget.rounds):
             return True
         if self._find_or_refute(size, budget):
             return True
-        return self._is_one_task and is_last and self._finds_tied(size, budget.rounds)
+        is_last = size == self.lower == self.upper - 1
+        return is_last and self._finds_tied(size, budget.rounds)
 
     def _find_or_refute(self, size: int, budget: Budget) -> bool:
         """`decide` among all partitions."""
