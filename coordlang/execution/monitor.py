@@ -25,7 +25,7 @@ from functools import cache, partial
 from io import BytesIO
 from itertools import accumulate
 from random import Random
-from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 FORMAT = "coordlang/choices"
 VERSION = 1
@@ -42,8 +42,19 @@ _SHOWN = 8  # things that a message lists
 _SHOWN_TEXT = 200  # characters of a text that a message shows
 _AROUND_PARENTHESES = re.compile(r"\s*([()])\s*")
 _PDDL_TEXT = re.compile(r"\([^()]+\)")
+
 _KINDS = {str: "a text", int: "a whole number", list: "a list", dict: "an object"}
-_Kind = TypeVar("_Kind")
+_PDDL = "text such as (move r1 a b)"
+# What a choices file holds: the shape of each key's value (`_check`).
+_FILE = {"choices": list, "sentence": str}
+_CHOICES = {"atoms": str, "facts": [_PDDL], "others": [_PDDL], "states": list}
+_STATE = {"step": int, "left": object, "next": dict, "true": list, "unknown": list}
+_EVENT = {"subaction": _PDDL, "after": {str: int}, "with": {str: _PDDL}}
+_PASSINGS = {
+    "others": {str: [{_PDDL: int}]},
+    "events": dict,
+    "interferes": {str: {str: [_PDDL]}},
+}
 
 #: In place of what is made of a detour: something that it excludes.
 _EXCLUDED = 1
@@ -128,26 +139,29 @@ class Monitor:
             raise MonitorError(
                 f"choices file version {_shown(version)}; this program reads version {VERSION}"
             )
-        entry = _entry(data, robot)
+        _check(data, _FILE, "the file")
+        entry = _entry(data["choices"], robot)
         if ("passings" in entry) != isinstance(self, EventMonitor):
             kind = "an EventMonitor" if "passings" in entry else "a Monitor"
             raise MonitorError(f"the choices in this file are for {kind}")
-        self.robot = _text(entry, "robot", "a robot's choices")
-        self.sentence = _text(data, "sentence", "the file")
+        self.robot, self.sentence = entry["robot"], data["sentence"]
         where = f"the choices of {self.robot}"
+        _check(entry, _CHOICES, where)
         #: "exact": known over every combination of the robots' choices; "own": from own subactions
         #: alone.
-        self.atoms = _text(entry, "atoms", where)
+        self.atoms = entry["atoms"]
         if self.atoms not in ("exact", "own"):
             raise _broken(f"{where}: 'atoms' is {_shown(self.atoms)}, not exact or own")
-        facts, others = (_nested(entry, key, where, list) for key in ("facts", "others"))
+        facts, others = entry["facts"], entry["others"]
         #: Every atom, and what is known of it in a state that does not mention it.
         self._atoms = {**dict.fromkeys(facts, False), **dict.fromkeys(sorted(others))}
         if len(self._atoms) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
+        for number, state in enumerate(entry["states"]):
+            _check(state, _STATE, f"state {number}")
         #: What the file says that the robot may do, as it is written there -> the subaction.
         self._written = {IDLE: IDLE, **self._read_events(entry, where)}
-        self._states = _read_states(entry, facts, where, self._written)
+        self._states = _read_states(entry, self._written)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(self._states))
         self._here = self._states[0]
         self._has_promised = False
@@ -351,17 +365,21 @@ class EventMonitor(Monitor):
         self._underway: str | None = None
 
     def _read_events(self, entry: Mapping[str, Any], where: str) -> dict[str, str]:
-        record = _get(entry, "passings", dict, where)
-        self._others = _others(record, where)
-        self._events = {
-            text: _own_event(event, self._others, f"event {_shown(text)}")
-            for text, event in _get(record, "events", dict, where).items()
-        }
+        _check(entry, {"passings": dict}, where)
+        record = entry["passings"]
+        _check(record, _PASSINGS, where)
         #: Own subaction -> other robot -> its subactions that interfere with it.
-        self._interferes: dict[str, dict[str, list[str]]]
-        self._interferes = _nested(record, "interferes", where, dict, dict, list)
-        for number, state in enumerate(_get(entry, "states", list, where)):
-            for text in _get(state, "next", dict, f"state {number}"):
+        self._interferes: dict[str, dict[str, list[str]]] = record["interferes"]
+        #: For each other robot what its events may be, and how many own ones they wait for.
+        self._others: dict[str, list[dict[str, int]]] = record["others"]
+        self._events: dict[str, _OwnEvent] = {}
+        for text, event in record["events"].items():
+            _check(event, _EVENT, f"event {_shown(text)}")
+            own = self._events[text] = _OwnEvent(event["subaction"], event["after"], event["with"])
+            if lost := (own.after.keys() | own.meets.keys()) - self._others.keys():
+                raise _broken(f"event {_shown(text)} waits for {_shown(min(lost))}: no such robot")
+        for number, state in enumerate(entry["states"]):
+            for text in state["next"]:
                 if text != IDLE and text not in self._events:
                     raise _broken(f"state {number}: 'events' lacks {_shown(text)}")
         return {text: event.subaction for text, event in self._events.items() if text != IDLE}
@@ -510,28 +528,6 @@ def drawn(monitor: Monitor, random: Random, allowed: Sequence[str | None]) -> st
     return allowed[bisect_right([*accumulate(left)], random.randrange(sum(left)))]
 
 
-def _own_event(record: Any, others: Mapping[str, Any], where: str) -> _OwnEvent:
-    after, meets = _nested(record, "after", where, dict, int), _get(record, "with", dict, where)
-    _check_inside(meets.values(), (), f"{where}: 'with'")
-    subaction = _text(record, "subaction", where)
-    _check_plain(subaction, where)
-    if lost := (after.keys() | meets.keys()) - others.keys():
-        raise _broken(f"{where} waits for {_shown(min(lost))}: no such robot")
-    return _OwnEvent(subaction, after, meets)
-
-
-def _others(record: Mapping[str, Any], where: str) -> dict[str, list[dict[str, int]]]:
-    """For each other robot what its events may be, and how many own ones they wait for at least."""
-    others: dict[str, list[dict[str, int]]] = _get(record, "others", dict, where)
-    for robot in others:
-        for event in _get(others, robot, list, f"{where}: 'others'"):
-            if not isinstance(event, Mapping):
-                raise _broken(f"{where}: an event of {_shown(robot)} is {_shown(event)}")
-            _check_inside(event, (), f"{where}: 'others'")
-            _check_inside(event, (int,), f"{where}: 'others'")
-    return others
-
-
 def _made_by(do: Sequence[str], never: Sequence[str], first: int, text: str) -> int:
     """The dos that a subaction makes, as bits from ``first`` on; `_EXCLUDED` if it is forbidden."""
     if any(_matches(pattern, text) for pattern in never):
@@ -591,56 +587,49 @@ def _broken(what: str) -> MonitorError:
     return MonitorError(f"this is no choices file: {what}")
 
 
-def _get(record: Any, key: str, kind: type[_Kind], where: str) -> _Kind:
-    """The value of a key; raises `MonitorError` if it is missing or of another type."""
-    if not isinstance(record, Mapping):
-        raise _broken(f"{where} is {_shown(record)}, not an object")
-    if key not in record:
-        raise _broken(f"{where}: '{key}' is missing")
-    value = record[key]
-    if not isinstance(value, kind) or isinstance(value, bool):
-        raise _broken(f"{where}: '{key}' is {_shown(value)}, not {_KINDS[kind]}")
-    return value
-
-
 def _is_number(value: object) -> bool:
     """Whether a value is a whole number; to Python true and false are, too."""
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-def _text(record: Any, key: str, where: str) -> str:
-    text = _get(record, key, str, where)
-    if not text.isprintable():
-        raise _broken(f"{where}: '{key}' holds control characters: {_shown(text)}")
-    return text
+def _check(record: object, shapes: Mapping[str, Any], where: str) -> None:
+    """Raise `MonitorError` unless a record has these keys, with values of these shapes."""
+    if not isinstance(record, Mapping):
+        raise _broken(f"{where} is {_shown(record)}, not an object")
+    for key, shape in shapes.items():
+        if key not in record:
+            raise _broken(f"{where}: '{key}' is missing")
+        _check_shape(record[key], shape, where, key)
 
 
-def _nested(record: Any, key: str, where: str, *kinds: type[Any]) -> Any:
-    """The value of a key, checked down through containers to numbers, or to plain texts."""
-    value = _get(record, key, kinds[0], where)
-    _check_inside(value, kinds[1:], f"{where}: '{key}'")
-    return value
+def _check_shape(value: Any, shape: Any, where: str, *keys: str) -> None:
+    """Check a value behind keys, of which the first and the last one are named.
+
+    Its shape is a type; `_PDDL`, for a text as `_plain` makes it; [that of each]; or {that of each
+    key: that of each value}.
+    """
+    kind = shape if isinstance(shape, type) else type(shape)
+    if shape is _PDDL:
+        if not isinstance(value, str) or not value.isprintable() or _plain_or_none(value) != value:
+            raise _broken(f"{where}: '{keys[0]}' has {_shown(value)} in place of {_PDDL}")
+    elif not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+        at = ": ".join(f"'{_shown(key)}'" for key in keys)
+        raise _broken(f"{where}: {at} is {_shown(value)}, not {_KINDS[kind]}")
+    elif shape is str and not value.isprintable():
+        raise _broken(f"{where}: '{keys[0]}' holds control characters: {_shown(value)}")
+    elif kind is not shape:
+        for inner in value:
+            of_each = shape[0] if kind is list else next(iter(shape))
+            _check_shape(inner, of_each, where, *keys)
+            if kind is dict:
+                _check_shape(value[inner], shape[of_each], where, keys[0], inner)
 
 
-def _check_inside(value: Iterable[Any], kinds: Sequence[type[Any]], where: str) -> None:
-    """Check what is behind the keys: values of these kinds inside one another, or the keys."""
-    for key in value:
-        if not kinds:
-            _check_plain(key, where)
-        elif not _is_number(inner := _get(value, key, kinds[0], where)):
-            _check_inside(inner, kinds[1:], where)
-
-
-def _check_plain(text: Any, where: str) -> None:
-    """Raise unless it is an atom or subaction as `_plain` makes them."""
-    if not isinstance(text, str) or not text.isprintable() or _plain_or_none(text) != text:
-        raise _broken(f"{where} has {_shown(text)} in place of text such as (move r1 a b)")
-
-
-def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
+def _entry(choices: Iterable[Any], robot: str | None) -> Mapping[str, Any]:
     entries: dict[str, Mapping[str, Any]] = {}
-    for entry in _get(data, "choices", list, "the file"):
-        name = _text(entry, "robot", "a robot's choices")
+    for entry in choices:
+        _check(entry, {"robot": str}, "a robot's choices")
+        name = entry["robot"]
         if name in entries:
             raise _broken(f"it has the choices of {_shown(name)} twice")
         entries[name] = entry
@@ -654,9 +643,7 @@ def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
     raise MonitorError(f"the file has no choices of {_shown(robot)}; it has those of {names}")
 
 
-def _read_states(
-    entry: Mapping[str, Any], facts: Sequence[str], where: str, written: dict[str, str]
-) -> list[_State]:
+def _read_states(entry: Mapping[str, Any], written: dict[str, str]) -> list[_State]:
     """The states of a file, read backwards; 0 is the start.
 
     ``written`` has texts that are known to be well written, and gets all others.  Raises
@@ -664,43 +651,42 @@ def _read_states(
     states of the next step, so that there are no cycles, all subplans have one length, and the
     counts of subplans agree: these never take much more memory than those in the file.
     """
-    records = _get(entry, "states", list, where)
-    steps = [_get(record, "step", int, f"state {n}") for n, record in enumerate(records)]
-    if not records or steps[0] != 0:
+    records, states = entry["states"], dict[int, _State]()
+    if not records or records[0]["step"] != 0:
         raise MonitorError("the automaton has no state 0 in step 0")
-    states: dict[int, _State] = {}
-    reached, last = {0}, max(steps)
+    reached, last = {0}, max(record["step"] for record in records)
     for number in reversed(range(len(records))):
-        record, step = records[number], steps[number]
-        moves = _moves(record, number, step + 1, states, written)
+        record, step = records[number], records[number]["step"]
+        moves = _moves(record["next"], number, step + 1, states, written)
         reached.update(moves.values())
         if not moves and step != last:
             raise MonitorError(f"state {number} ends after {step} of {last} steps")
         left = sum(states[to].left for to in moves.values()) or 1
-        _check_count(record, "left", left, f"state {number}")
-        states[number] = _State(step, _known(record, facts, number), moves, left)
+        _check_count(record["left"], left, f"state {number}")
+        states[number] = _State(step, _known(record, entry["facts"], number), moves, left)
     if lost := states.keys() - reached:
         raise MonitorError(f"state {min(lost)} cannot be reached from state 0")
-    _check_whole(entry, last, states[0].left)
+    if "steps" in entry:
+        _check(entry, {"steps": int}, "a robot's choices")
+        if entry["steps"] != last:
+            raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {last}")
+    if "subplans" in entry:
+        _check_count(entry["subplans"], states[0].left, "a robot's choices")
     return [*reversed(states.values())]
 
 
-def _check_whole(entry: Mapping[str, Any], steps: int, subplans: int) -> None:
-    """Raise if a robot's choices say that they have other numbers of steps or subplans."""
-    if "steps" in entry and _get(entry, "steps", int, "a robot's choices") != steps:
-        raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {steps}")
-    if "subplans" in entry:
-        _check_count(entry, "subplans", subplans, "a robot's choices")
-
-
 def _moves(
-    record: Any, number: int, step: int, states: Mapping[int, _State], written: dict[str, str]
+    following: Mapping[str, Any],
+    number: int,
+    step: int,
+    states: Mapping[int, _State],
+    written: dict[str, str],
 ) -> dict[str | None, int]:
     """What the robot may do in a state, idling first."""
     moves: dict[str | None, int] = {}
-    for text, to in _get(record, "next", dict, f"state {number}").items():
+    for text, to in following.items():
         if text not in written:
-            _check_plain(text, f"state {number}: 'next'")
+            _check_shape(text, _PDDL, f"state {number}", "next")
             written[text] = text
         if not _is_number(to) or to not in states or states[to].step != step:
             raise MonitorError(f"state {number} does not lead to a state of step {step}")
@@ -708,11 +694,11 @@ def _moves(
     return dict(sorted(moves.items(), key=lambda move: move[0] or ""))
 
 
-def _known(record: Any, facts: Sequence[str], number: int) -> dict[str, bool | None]:
+def _known(record: Mapping[str, Any], facts: Sequence[str], number: int) -> dict[str, bool | None]:
     """The facts that are true, or may be true, in a state of a file."""
     found: dict[str, bool | None] = {}
     for key, value in (("true", True), ("unknown", None)):
-        for fact in _get(record, key, list, f"state {number}"):
+        for fact in record[key]:
             if not _is_number(fact) or not 0 <= fact < len(facts):
                 raise _broken(
                     f"state {number}: '{key}' has {_shown(fact)}; "
@@ -723,11 +709,8 @@ def _known(record: Any, facts: Sequence[str], number: int) -> dict[str, bool | N
     return found
 
 
-def _check_count(record: Mapping[str, Any], key: str, count: int, where: str) -> None:
+def _check_count(said: object, count: int, where: str) -> None:
     """Raise unless a count in the file, a number or above 2^53 its digits, is this one."""
-    if key not in record:
-        raise _broken(f"{where}: '{key}' is missing")
-    said = record[key]
     is_digits = isinstance(said, str) and re.fullmatch("[1-9][0-9]*", said)
     # A `Decimal` is exact, and unlike `int` not limited to some digits.
     if not (is_digits or _is_number(said)) or Decimal(said) != count:
