@@ -28,7 +28,8 @@ from coordlang.commands.terminal import (
 )
 from coordlang.commands.witness import witness_text
 from coordlang.execution import choices as execution
-from coordlang.execution.choices import RobotChoices, SentenceChoices, to_bytes
+from coordlang.execution.automaton import Automaton
+from coordlang.execution.choices import SentenceChoices, to_bytes
 from coordlang.execution.monitor import Monitor
 from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.language.candidates import describe
@@ -95,7 +96,7 @@ class RobotsChoices(InTask):
     @property
     def subplans(self) -> dict[str, int]:
         """Robot -> the exact number of its subplans."""
-        counts = (self.found.robots[number].automaton.count for number in self.chosen)
+        counts = (self.found.robots[number].count for number in self.chosen)
         return dict(zip(self.robots, counts, strict=True))
 
     @property
@@ -174,40 +175,38 @@ def _text(found: RobotsChoices, width: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
+def _table(found: RobotsChoices, own: Automaton, width: int) -> list[str]:
     """The automaton state by state: what may be done there, where it leads, what is known there.
 
     Alternatives have a line each where they would take more than half of the width.
     """
-    model, automaton = found.used.model, own.automaton
-    subplans, states = counted(automaton.count, "subplan"), counted(len(automaton), "state")
+    subplans, states = counted(own.count, "subplan"), counted(len(own), "state")
     lines = [f"follow {subplans} ({states}):"]
     if rows := [*islice(_rows(found.used, own), STATES_SHOWN)]:
         widest = max(len(" | ".join(moves)) for *_, moves, _ in rows)
         mark = " | " if widest <= width // 2 else "\n| "
-        head = (model.unit, "state", "left", "may do", "knows")
+        head = (found.used.model.unit, "state", "left", "may do", "knows")
         cells = [(*row[:3], mark.join(row[3]), row[4]) for row in rows]
         lines += columns([head, *cells], width, numbers=3)
-    rest = automaton.layers[-1].start - len(rows)
+    rest = own.layers[-1].start - len(rows)
     if rest > 0:
         lines.append(f"  .. and {counted(rest, 'state')} more; --format json has all of them")
     return lines
 
 
-def _rows(used: TaskLanguage, own: RobotChoices) -> Iterator[tuple[str, str, str, list[str], str]]:
+def _rows(used: TaskLanguage, own: Automaton) -> Iterator[tuple[str, str, str, list[str], str]]:
     """The cells of each state; what may be done there is a list.
 
     What is known are the atoms that are true there, but not in all states of the step.
     """
-    automaton, nothing = own.automaton, _IDLING[used.model.unit]
-    texts = used.model.codec.facts.texts
-    for step, layer in enumerate(automaton.layers[:-1], 1):
-        known = [each.true for each in automaton.known[layer.start : layer.stop]]
+    nothing, texts = _IDLING[used.model.unit], used.model.codec.facts.texts
+    for step, layer in enumerate(own.layers[:-1], 1):
+        known = [each.true for each in own.known[layer.start : layer.stop]]
         everywhere = reduce(and_, known)
         for state, true in zip(layer, known, strict=True):
             knows = " ".join(texts[fact] for fact in bits(true & ~everywhere))
             moves = [
                 f"{used.model.label_text(own.robot, label) or nothing} -> {to}"
-                for label, to in automaton.moves[state].items()
+                for label, to in own.moves[state].items()
             ]
-            yield str(step), str(state), f"{automaton.left[state]:,}", moves, knows
+            yield str(step), str(state), f"{own.left[state]:,}", moves, knows

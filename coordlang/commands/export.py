@@ -71,7 +71,7 @@ def export(files: Arguments, options: ExportOptions) -> Any:
         return ExportedTask(used, words, strips_only=options.for_planner == "pyperplan")
     if options.to == "bt":
         found = choices_under(used, words)
-        counts = {used.model.robots[own.robot]: own.automaton.count for own in found.robots}
+        counts = {used.model.robots[own.robot]: own.count for own in found.robots}
         return ExportedTrees(used, behaviour_trees(found), counts, found.guaranteed)
     return export_ltlf(used, words)
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import reduce
 from itertools import accumulate, chain
 from operator import and_, or_
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -43,6 +43,11 @@ class Knowledge(NamedTuple):
     unknown: int
 
 
+#: How what is known in an automaton's states was found: over every combination of all robots'
+#: choices, or from the robot's own subactions alone.
+Atoms = Literal["exact", "own"]
+
+
 @dataclass(frozen=True, slots=True)
 class Automaton:
     """A deterministic automaton over one robot's label numbers (0: idle); state 0 is its start.
@@ -50,13 +55,15 @@ class Automaton:
     ``layers[k]`` are the states after k steps or events, those of the last one are final.  For each
     state ``moves`` has label -> next state, sorted, ``left`` the exact number of subplans from it
     on, at least 1, and ``known`` what the robot knows there, all empty where no knowledge was
-    computed.
+    computed; ``atoms`` says how it was.
     """
 
+    robot: int
     layers: tuple[range, ...]
     moves: tuple[Mapping[int, int], ...]
     left: tuple[int, ...]
     known: tuple[Knowledge, ...]
+    atoms: Atoms = "exact"
 
     def __len__(self) -> int:
         """Count the states."""
@@ -110,7 +117,7 @@ def determinise(
                 state = known, tuple((own, number_of[nodes]) for own, nodes in moves.items())
                 number_of[subset] = numbers.setdefault(state, len(numbers))
             merged.append(list(numbers))
-    return _numbered(merged[::-1])
+    return _numbered(robot, merged[::-1])
 
 
 #: Numbers of nodes of a layer of the plan space, sorted.
@@ -161,7 +168,7 @@ def _alike(
     return alike
 
 
-def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:
+def _numbered(robot: int, merged: Sequence[Sequence[_State]]) -> Automaton:
     """Number the states layer by layer, where a walk by labels has met them in their order."""
     ends = [*accumulate(map(len, merged))]
     layers = tuple(range(end - len(own), end) for own, end in zip(merged, ends, strict=True))
@@ -170,7 +177,7 @@ def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:
     left = [1] * len(states)
     for state in reversed(range(layers[-1].start)):
         left[state] = sum(left[to] for to in moves[state].values())
-    return Automaton(layers, moves, tuple(left), tuple(known for _, known, _ in states))
+    return Automaton(robot, layers, moves, tuple(left), tuple(known for _, known, _ in states))
 
 
 # ---- every combination of the robots' choices

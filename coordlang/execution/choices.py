@@ -13,13 +13,14 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import and_
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from coordlang.execution.automaton import (
+    Atoms,
     Automaton,
     Knowledge,
     Mixtures,
@@ -43,19 +44,6 @@ from planners.system.files import FileFormat, doc
 #: Combinations of the robots' moves beyond which exact knowledge is not tried by default.
 MOST = 2_000_000
 
-#: How what is known in an automaton's states was found: over every combination of all robots'
-#: choices, or from the robot's own subactions alone.
-Atoms = Literal["exact", "own"]
-
-
-@dataclass(frozen=True, slots=True)
-class RobotChoices:
-    """One robot's subplans as an automaton with what it knows, and how this was found."""
-
-    robot: int
-    automaton: Automaton
-    atoms: Atoms
-
 
 @dataclass(frozen=True, slots=True)
 class SentenceChoices:
@@ -68,7 +56,7 @@ class SentenceChoices:
     task_language: TaskLanguage
     words: tuple[int, ...]
     fits: PlanSpace
-    robots: tuple[RobotChoices, ...]
+    robots: tuple[Automaton, ...]
     mixtures: Mixtures | None
 
     @property
@@ -101,11 +89,11 @@ def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST)
         exact = None
         with suppress(OutOfMemory):  # the combinations are checked all the same
             exact = space and determinise(space, robot, truth, most)
-        robots.append(RobotChoices(robot, exact, "exact") if exact else knowing_own(fits, robot))
+        robots.append(exact or knowing_own(fits, robot))
     return SentenceChoices(task_language, tuple(words), fits, tuple(robots), mixtures)
 
 
-def knowing_own(fits: PlanSpace, robot: int) -> RobotChoices:
+def knowing_own(fits: PlanSpace, robot: int) -> Automaton:
     """A robot's subplans; of what its own subactions alone change it knows the values."""
     model, start = fits.model, int(fits.starts[0])
     facts, changes = own_changes(model, robot)
@@ -120,7 +108,7 @@ def knowing_own(fits: PlanSpace, robot: int) -> RobotChoices:
         true[after] = (true[node] & ~deletes) | adds  # the same on all ways to a node
     automaton = determinise(fits, robot, true)
     known = tuple(Knowledge(own.true, others) for own in automaton.known)
-    return RobotChoices(robot, replace(automaton, known=known), "own")
+    return replace(automaton, known=known, atoms="own")
 
 
 def own_changes(model: JointModel, robot: int) -> tuple[int, dict[str | None, tuple[int, int]]]:
@@ -266,26 +254,25 @@ def to_bytes(choices: SentenceChoices, robots: Sequence[int] | None = None) -> b
     return msgspec.json.encode(to_record(choices, robots)) + b"\n"
 
 
-def monitor(fits: PlanSpace, own: RobotChoices, sentence: str) -> Monitor:
+def monitor(fits: PlanSpace, own: Automaton, sentence: str) -> Monitor:
     """A run-time monitor of a robot's subplans in some plans, those with a sentence."""
     entry = msgspec.to_builtins(_robot(fits, own))
     data = {"format": FORMAT, "version": VERSION, "sentence": sentence, "choices": [entry]}
     return EventMonitor(data) if fits.model.is_asynchronous else Monitor(data)
 
 
-def _robot(fits: PlanSpace, own: RobotChoices) -> RobotRecord:
-    model, automaton = fits.model, own.automaton
-    texts = model.codec.facts.texts
-    others = [*bits(reduce(and_, (known.unknown for known in automaton.known)))]
+def _robot(fits: PlanSpace, own: Automaton) -> RobotRecord:
+    model, texts = fits.model, fits.model.codec.facts.texts
+    others = [*bits(reduce(and_, (known.unknown for known in own.known)))]
     facts = sorted({*range(len(texts))} - {*others})
     return RobotRecord(
         robot=model.robots[own.robot],
-        steps=automaton.steps,
-        subplans=json_count(automaton.count),
+        steps=own.steps,
+        subplans=json_count(own.count),
         atoms=own.atoms,
         facts=[texts[fact] for fact in facts],
         others=[texts[fact] for fact in others],
-        states=_states(automaton, model.labels[own.robot], facts),
+        states=_states(own, model.labels[own.robot], facts),
         passings=_passings(fits, own) if model.is_asynchronous else UNSET,
     )
 
@@ -307,7 +294,7 @@ def _states(automaton: Automaton, labels: Sequence[str], facts: Sequence[int]) -
     ]
 
 
-def _passings(fits: PlanSpace, own: RobotChoices) -> Passings:
+def _passings(fits: PlanSpace, own: Automaton) -> Passings:
     """What a robot waits for in its subplans, and what it may hear of the others."""
     model, robot = fits.model, own.robot
     may_be = {
@@ -317,7 +304,7 @@ def _passings(fits: PlanSpace, own: RobotChoices) -> Passings:
     }
     events = {
         model.labels[robot][label]: event
-        for label in sorted(own.automaton.labels)
+        for label in sorted(own.labels)
         if (event := model.events[robot][label])
     }
     labels = sorted({event.label for event in events.values()})

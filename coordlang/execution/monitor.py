@@ -608,7 +608,7 @@ def _check_shape(value: Any, shape: Any, where: str, *keys: str) -> None:
     Its shape is a type; `_PDDL`, for a text as `_plain` makes it; [that of each]; or {that of each
     key: that of each value}.
     """
-    kind = shape if isinstance(shape, type) else type(shape)
+    kind: Any = shape if isinstance(shape, type) else type(shape)
     if shape is _PDDL:
         if not isinstance(value, str) or not value.isprintable() or _plain_or_none(value) != value:
             raise _broken(f"{where}: '{keys[0]}' has {_shown(value)} in place of {_PDDL}")
@@ -709,7 +709,7 @@ def _known(record: Mapping[str, Any], facts: Sequence[str], number: int) -> dict
     return found
 
 
-def _check_count(said: object, count: int, where: str) -> None:
+def _check_count(said: Any, count: int, where: str) -> None:
     """Raise unless a count in the file, a number or above 2^53 its digits, is this one."""
     is_digits = isinstance(said, str) and re.fullmatch("[1-9][0-9]*", said)
     # A `Decimal` is exact, and unlike `int` not limited to some digits.

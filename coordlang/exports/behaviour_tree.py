@@ -20,7 +20,8 @@ from itertools import chain, product
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from coordlang.execution.choices import RobotChoices, SentenceChoices
+from coordlang.execution.automaton import Automaton
+from coordlang.execution.choices import SentenceChoices
 from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel
 from planners.joint.states import bits
@@ -100,7 +101,7 @@ def _leaves(model: JointModel) -> Mapping[str, _Leaf]:
     return {name: leaf for name, leaf in _LEAVES.items() if name not in left_out}
 
 
-def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
+def _tree(model: JointModel, own: Automaton) -> ET.Element:
     name = model.robots[own.robot]
     tree = ET.Element("BehaviorTree", ID=name)
     steps = ET.SubElement(tree, "Sequence", name=name)
@@ -110,7 +111,7 @@ def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
         for action in model.in_step.actions
         if own.robot in action.owners and not action.parts
     }
-    for step, states in enumerate(own.automaton.layers[:-1]):
+    for step, states in enumerate(own.layers[:-1]):
         here = ET.SubElement(steps, "Sequence", name=f"{model.unit} {step}")
         if not model.is_asynchronous:
             here.append(_leaf("AwaitStep", step=str(step)))
@@ -119,7 +120,7 @@ def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
 
 
 def _branches(
-    model: JointModel, own: RobotChoices, states: range, actions: Mapping[str, GroundAction]
+    model: JointModel, own: Automaton, states: range, actions: Mapping[str, GroundAction]
 ) -> tuple[ET.Element, ET.Element]:
     """What chooses a move of the present state, and what does it.
 
@@ -128,7 +129,7 @@ def _branches(
     can succeed.
     """
     choose, act = ET.Element("Fallback", name="choose"), ET.Element("Fallback", name="act")
-    moves = [(state, *move) for state in states for move in own.automaton.moves[state].items()]
+    moves = [(state, *move) for state in states for move in own.moves[state].items()]
     last = {state: label for state, label, _ in moves}
     for number, (state, label, target) in enumerate(moves):
         branch = ET.SubElement(choose, "Sequence")
@@ -142,7 +143,7 @@ def _branches(
         text = model.subaction_text(own.robot, label)
         if text is not None:
             branch.extend(_awaiting(model, own.robot, label, text))
-            known = {*bits(own.automaton.known[state].true)}
+            known = {*bits(own.known[state].true)}
             needed = goal_facts(model, actions[text].precondition) if text in actions else ()
             for fact in sorted(known.intersection(needed)):
                 ET.SubElement(branch, "Condition", ID="Holds", fact=model.codec.facts.texts[fact])

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.execution.automaton import Automaton, determinise
-from coordlang.execution.choices import RobotChoices, SentenceChoices, choices, monitor, own_changes
+from coordlang.execution.choices import SentenceChoices, choices, monitor, own_changes
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import from_problems
 from planners.pddl.lifted import TRUE
@@ -40,19 +40,18 @@ def moves(automaton: Automaton) -> list[dict[int, int]]:
 def check_automata(found: SentenceChoices, twin: Listed) -> None:
     """Each accepts just the robot's own parts, and is the least that knows what it knows."""
     facts = found.task_language.model.codec.facts.texts
-    for own, parts in zip(found.robots, twin.own, strict=True):
-        automaton = own.automaton
+    for automaton, parts in zip(found.robots, twin.own, strict=True):
         assert accepted(moves(automaton)) == parts
         assert automaton.count == len(parts)
         for state in range(len(automaton)):
             labels = list(automaton.moves[state])
             assert labels == sorted(set(labels))
-        plain = determinise(found.fits, own.robot)
+        plain = determinise(found.fits, automaton.robot)
         assert accepted(moves(plain)) == parts
-        assert len(plain) == twin.least(own.robot)
-        if own.atoms == "exact":
-            known = twin.knows(own.robot)
-            assert len(automaton) == twin.least(own.robot, known)
+        assert len(plain) == twin.least(automaton.robot)
+        if automaton.atoms == "exact":
+            known = twin.knows(automaton.robot)
+            assert len(automaton) == twin.least(automaton.robot, known)
         for part in parts:
             state = 0
             for step in range(len(part) + 1):
@@ -62,7 +61,7 @@ def check_automata(found: SentenceChoices, twin: Listed) -> None:
                     frozenset(f for n, f in enumerate(facts) if true >> n & 1),
                     frozenset(f for n, f in enumerate(facts) if not (true | unknown) >> n & 1),
                 )
-                if own.atoms == "exact":
+                if automaton.atoms == "exact":
                     assert said == known[part[:step]]
                 if step < len(part):
                     state = automaton.moves[state][part[step]]
@@ -71,7 +70,7 @@ def check_automata(found: SentenceChoices, twin: Listed) -> None:
 def check_combinations(found: SentenceChoices, twin: Listed) -> None:
     """Every combination, stepped through all monitors, is an optimal plan; no others go through."""
     labels = found.task_language.model.labels
-    for chosen in product(*(accepted(moves(own.automaton)) for own in found.robots)):
+    for chosen in product(*(accepted(moves(own)) for own in found.robots)):
         monitors = [monitor(found.fits, own, "") for own in found.robots]
         for step in zip(*chosen, strict=True):
             for number, (at, label) in enumerate(zip(monitors, step, strict=True)):
@@ -99,7 +98,7 @@ def test_every_combination_is_optimal(robots: int, models: int) -> None:
         seen["several for all"] += all(len(own) > 1 for own in twin.own)
         seen["another sentence"] += twin.combinations > len(twin.plans)
         seen["knowledge splits"] += any(
-            len(own.automaton) > len(determinise(found.fits, own.robot)) for own in found.robots
+            len(own) > len(determinise(found.fits, own.robot)) for own in found.robots
         )
         if twin.combinations > 1 and stepped[seed] < 200:
             check_combinations(found, twin)
@@ -155,7 +154,7 @@ def test_own_atoms_are_known(robots: int, models: int) -> None:
         if not twin.mixes:
             continue
         found = choices(task_language, words, most=0)
-        if len(found.robots[0].automaton.layers) > 1:
+        if len(found.robots[0].layers) > 1:
             assert found.mixtures is None
             check_automata(found, twin)
             for own in found.robots:
@@ -164,7 +163,7 @@ def test_own_atoms_are_known(robots: int, models: int) -> None:
 
 
 def check_own_atoms(
-    task_language: TaskLanguage, own: RobotChoices, twin: Listed, seen: Counter[str]
+    task_language: TaskLanguage, own: Automaton, twin: Listed, seen: Counter[str]
 ) -> None:
     assert own.atoms == "own"
     known = twin.knows(own.robot)
@@ -173,14 +172,14 @@ def check_own_atoms(
     for part in twin.own[own.robot]:
         state = 0
         for step, label in enumerate((*part, None)):
-            true, unknown = own.automaton.known[state]
+            true, unknown = own.known[state]
             for number, fact in enumerate(facts):
                 says = ("false", "true", "unknown")[(true >> number & 1) - (unknown >> number & 1)]
                 seen[says] += 1
                 assert (says == "unknown") == (not mask >> number & 1)
                 assert says == "unknown" or fact in known[part[:step]][says == "false"]
             if label is not None:
-                state = own.automaton.moves[state][label]
+                state = own.moves[state][label]
 
 
 WORLDS = "handover/three-rooms", "two-arms/exchange", "lock/three-robots", "elevator/same-floor"
@@ -222,7 +221,7 @@ def test_a_task_that_starts_at_its_goal() -> None:
     (task_language,) = languages_in_tasks(build_language(candidates, "greedy").language, candidates)
     found = choices(task_language, (int(task_language.word[task_language.start]),))
     for own in found.robots:
-        assert len(own.automaton) == own.automaton.count == 1
+        assert len(own) == own.count == 1
         at = monitor(found.fits, own, "")
         assert at.finished
         assert (at.step, at.remaining, at.allowed()) == (0, 1, ())

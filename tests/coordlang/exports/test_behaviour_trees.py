@@ -169,7 +169,7 @@ def run_every_mixture(used: TaskLanguage) -> int:
             Team(xml, used.model).run(plan, twin.facts[chosen])
         most = max(most, len(twin.mixed))
         # A tree is as large as the automaton: one that lists the subplans is larger.
-        edges = sum(sum(map(len, own.automaton.moves)) for own in found.robots)
+        edges = sum(sum(map(len, own.moves)) for own in found.robots)
         scripts = [node.get("code", "") for node in ET.fromstring(xml).iter("Script")]
         assert sum(code.startswith("move") for code in scripts) == edges
     return most
