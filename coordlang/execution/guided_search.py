@@ -20,8 +20,8 @@ from planners.search.plans import Plan, Plans
 
 #: (joint steps, second component of the cost).
 Cost = tuple[int, int]
-#: A state's number, the index in the sentence of its word, and the cost at which it was met.
-Node = tuple[int, int, Cost]
+#: A state's row, the index in the sentence of its word, and the cost at which it was met.
+Node = tuple[bytes, int, Cost]
 #: The number of a joint step out of a state, the node that it leads to, and its labels.
 Step = tuple[int, Node, tuple[int, ...]]
 #: How a node was met: from which one, and by which labels.
@@ -101,10 +101,10 @@ def _a_star(
     predecessor was expanded last, then the one with the smallest labels.
     """
     last = len(words or (0,)) - 1
-    best: dict[int, Cost] = {0: (0, 0)}
+    best: dict[bytes, Cost] = {states.init: (0, 0)}
     ways: Ways = {}
     queue: list[tuple[Cost, int, int, int, int, Node]] = []
-    expanded: list[int] = []
+    expanded: list[bytes] = []
 
     def put(node: Node, order: int) -> None:
         state, index, (steps, second) = node
@@ -112,7 +112,7 @@ def _a_star(
         least = max(states.height[state], left if count_words else 0)
         heappush(queue, ((steps + least, second), least, left, -len(expanded), order, node))
 
-    put((0, 0, (0, 0)), 0)
+    put((states.init, 0, (0, 0)), 0)
     while queue:
         *_, node = heappop(queue)
         state, index, cost = node
@@ -129,10 +129,9 @@ def _a_star(
 
 
 class _States:
-    """The states that a search meets, by number: the initial one is 0.
+    """The states that a search meets: ``height`` are lower bounds of the joint steps from each.
 
-    ``rows`` are their rows, ``height`` lower bounds of the joint steps from each, 0 exactly where
-    the goal holds.
+    They are 0 exactly where the goal holds.
     """
 
     def __init__(
@@ -142,30 +141,27 @@ class _States:
         goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
         self.model, self.partition, self._words = space.model, task_language.partition, words
         self._bound = heuristic(bound, space.model, goal, init)
-        self.rows, self.height = list[Rows](), list[int]()
-        self._number: dict[bytes, int] = {}
-        self._numbers(init[None, :])
+        self.height: dict[bytes, int] = {}
+        (self.init,) = self._keys(init[None, :])
 
-    def _numbers(self, rows: Rows) -> list[int]:
-        """The numbers of the states of a table; those that are new are bounded at once."""
+    def _keys(self, rows: Rows) -> list[bytes]:
+        """The states of a table; those that are new are bounded at once."""
         keys = [row.tobytes() for row in rows]
-        fresh = list({key: n for n, key in enumerate(keys) if key not in self._number}.values())
-        self.height += self._bound(rows[fresh]).tolist() if fresh else []
-        for n in fresh:
-            self._number[keys[n]] = len(self.rows)
-            self.rows.append(rows[n])
-        return [self._number[key] for key in keys]
+        if fresh := {key: n for n, key in enumerate(keys) if key not in self.height}:
+            values = self._bound(rows[[*fresh.values()]]).tolist()
+            self.height.update(zip(fresh, values, strict=True))
+        return keys
 
     def steps(self, node: Node) -> Iterator[Step]:
         """The joint steps out of a node that fit the sentence and may lead to the goal."""
         state, index, (steps, second) = node
-        found = self.model.successors(self.rows[state][None, :])
+        found = self.model.successors(np.frombuffer(state, np.uint64)[None, :])
         goes_on, kept = np.zeros(len(found.result), np.int64), np.arange(len(found.result))
         if self._words is not None:
             word = self.partition.word_of(found.result)
             goes_on = (word != self._words[index]).astype(np.int64)
             kept = np.flatnonzero(np.isin(word, self._words[index : index + 2]))
-        for number, target in zip(kept.tolist(), self._numbers(found.result[kept]), strict=True):
+        for number, target in zip(kept.tolist(), self._keys(found.result[kept]), strict=True):
             if self.height[target] < FAR:
                 cost = steps + 1, second + int(found.cost[number])
                 to = target, index + int(goes_on[number]), cost

@@ -25,7 +25,7 @@ from functools import cache, partial
 from io import BytesIO
 from itertools import accumulate
 from random import Random
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, Self
 
 FORMAT = "coordlang/choices"
 VERSION = 1
@@ -332,14 +332,6 @@ class Monitor:
         raise MonitorError(f"{_shown(atom)} is no atom that can change: {similar}")
 
 
-class _OwnEvent(NamedTuple):
-    """What an event does, how many events of each other robot it waits for, and whom it meets."""
-
-    subaction: str
-    after: Mapping[str, int]
-    meets: Mapping[str, str]
-
-
 class EventMonitor(Monitor):
     """Follows a robot that keeps no common step with the others.
 
@@ -372,17 +364,17 @@ class EventMonitor(Monitor):
         self._interferes: dict[str, dict[str, list[str]]] = record["interferes"]
         #: For each other robot what its events may be, and how many own ones they wait for.
         self._others: dict[str, list[dict[str, int]]] = record["others"]
-        self._events: dict[str, _OwnEvent] = {}
-        for text, event in record["events"].items():
+        #: What an event does, how many of each robot it waits for, and whom it meets in what.
+        self._events: dict[str, dict[str, Any]] = record["events"]
+        for text, event in self._events.items():
             _check(event, _EVENT, f"event {_shown(text)}")
-            own = self._events[text] = _OwnEvent(event["subaction"], event["after"], event["with"])
-            if lost := (own.after.keys() | own.meets.keys()) - self._others.keys():
+            if lost := (event["after"].keys() | event["with"].keys()) - self._others.keys():
                 raise _broken(f"event {_shown(text)} waits for {_shown(min(lost))}: no such robot")
         for number, state in enumerate(entry["states"]):
             for text in state["next"]:
                 if text != IDLE and text not in self._events:
                     raise _broken(f"state {number}: 'events' lacks {_shown(text)}")
-        return {text: event.subaction for text, event in self._events.items() if text != IDLE}
+        return {text: own["subaction"] for text, own in self._events.items() if text != IDLE}
 
     @property
     def finished(self) -> bool:
@@ -391,11 +383,11 @@ class EventMonitor(Monitor):
 
     def subaction(self, event: str) -> str:
         """What is done in an event."""
-        return self._event(event).subaction
+        return str(self._event(event)["subaction"])
 
     def partners(self, event: str) -> tuple[str, ...]:
         """The robots that an event meets."""
-        return tuple(self._event(event).meets)
+        return tuple(self._event(event)["with"])
 
     def concerns(self, event: str) -> tuple[str, ...]:
         """The robots that may wait for an own event, and so should be told when it has ended."""
@@ -415,10 +407,10 @@ class EventMonitor(Monitor):
             return {}
         own = self._events[event]
         found: dict[str, int | str] = {
-            robot: its for robot, its in own.meets.items() if self._ready.get(robot) != its
+            robot: its for robot, its in own["with"].items() if self._ready.get(robot) != its
         }
-        for robot, number in own.after.items():
-            texts = {*self._interferes.get(own.subaction, {}).get(robot, ())}
+        for robot, number in own["after"].items():
+            texts = {*self._interferes.get(own["subaction"], {}).get(robot, ())}
             if (left := number - sum(self._ended.get((robot, text), 0) for text in texts)) > 0:
                 found[robot] = left
         return found
@@ -457,7 +449,7 @@ class EventMonitor(Monitor):
         known = {a: v if v is self._value(to, a) else None for a, v in values.items()}
         self._here = _State(here.step, known, {text: here.moves[text]}, to.left)
         self._underway = text
-        self._forget_ready(self._events[text].meets)  # not for the next meeting
+        self._forget_ready(self._events[text]["with"])  # not for the next meeting
 
     def did(self, subaction: str | None) -> None:
         """Tell that the event under way has ended; None: the robot does no more.
@@ -471,7 +463,7 @@ class EventMonitor(Monitor):
         while self.finished and self._here.moves:
             super().did(None)
         if self._underway:
-            self._count("", self._events[self._underway].subaction)
+            self._count("", self._events[self._underway]["subaction"])
         self._underway = None
 
     def ended(self, robot: str, subaction: str, number: int) -> None:
@@ -507,7 +499,7 @@ class EventMonitor(Monitor):
     def _forget_ready(self, robots: Iterable[str]) -> None:
         self._ready = {name: its for name, its in self._ready.items() if name not in robots}
 
-    def _event(self, event: str) -> _OwnEvent:
+    def _event(self, event: str) -> dict[str, Any]:
         if event not in self._events:
             raise MonitorError(f"{_shown(event)} is no event of {self.robot}")
         return self._events[event]

@@ -193,24 +193,19 @@ def read_simulation(path: str | Path) -> SimulationRecord:
 
 def event_text(event: EventRecord) -> str:
     """Return an event in words."""
-    who = " and ".join(event.robots)
-    match event.kind:
-        case "collision":
-            return f"{who} touches {event.touched}" if event.touched else f"{who} collide"
-        case "stopped":
-            return f"{who} stands before something"
-        case "missed":
-            return f"{who} is not there when a step begins"
-        case "word":
-            return f"{who} may have come to word {event.words[who] + 1} of the sentence"
-        case "contradicted":
-            return f"{who} heard of an event that its plan excludes"
-        case "detour":
-            allowed = "its choices allow it" if event.granted else "impossible"
-            return f"{who} wants to visit {event.visit}: {allowed}"
-        case "deadlock":
-            return "nobody moves any more"
-    return "all have arrived"
+    who, touched = " and ".join(event.robots), event.touched
+    allowed = "its choices allow it" if event.granted else "impossible"
+    texts = {
+        "collision": f"{who} touches {touched}" if touched else f"{who} collide",
+        "stopped": f"{who} stands before something",
+        "missed": f"{who} is not there when a step begins",
+        "word": f"{who} may have come to word {event.words.get(who, 0) + 1} of the sentence",
+        "contradicted": f"{who} heard of an event that its plan excludes",
+        "detour": f"{who} wants to visit {event.visit}: {allowed}",
+        "deadlock": "nobody moves any more",
+        "arrived": "all have arrived",
+    }
+    return texts[event.kind]
 
 
 def _wrong(record: SimulationRecord, run: RunRecord) -> str | None:

@@ -38,57 +38,6 @@ class Notice:
     subaction: str = ""
 
 
-class Pace:
-    """One robot's way to keep step with the others, as ``--step`` has it; a period is in seconds.
-
-    - ``clock``: step k begins k periods after the start, by a clock that all robots have.
-    - ``barrier``: step k begins when every robot has told that it has done k steps.
-    - ``word``: a robot goes on as soon as it has done a step.  Only where the next word may have
-      begun it tells so, and waits until every robot has.
-    - ``passings``: there are no steps.  A robot starts an event when those of others that it waits
-      for have ended, which they tell if it matters to somebody, and so that they are ready for a
-      meeting.
-    """
-
-    def __init__(self, way: str, robots: Iterable[str], period: float) -> None:
-        self._way, self.period = way, period
-        self._heard = dict.fromkeys(robots, 0)
-
-    @property
-    def is_common(self) -> bool:
-        """Whether all robots turn in the same time before they drive, and idle without time."""
-        return self._way in ("clock", "barrier")
-
-    def hears(self, messages: Iterable[Notice]) -> None:
-        """Take in how far the others are."""
-        for message in messages:
-            self._heard[message.sender] = max(self._heard[message.sender], message.number)
-
-    def told(self, steps: int, words: int, is_further: bool) -> Sequence[tuple[Kind, int]]:
-        """What to tell all robots after a step, by which ``is_further`` in the sentence."""
-        if self._way == "barrier":
-            return [("step", steps)]
-        return [("word", words)] if self._way == "word" and is_further else []
-
-    def may_begin(self, steps: int, words: int, begun: float, time: float) -> bool:
-        """Whether the next step may begin.
-
-        ``steps`` are done, and ``words`` of the sentence passed at most; the last step was begun at
-        ``begun`` (seconds; negative before the first).  By the clock, who is late misses a
-        beginning.
-        """
-        if self._way == "clock":
-            return abs(math.remainder(time, self.period)) < _SAME and begun < time
-        if self._way == "passings":
-            return True
-        own = steps if self._way == "barrier" else words
-        return all(heard >= own for heard in self._heard.values())
-
-    def missed(self, steps: int, time: float) -> int:
-        """How many beginnings by the clock a step comes too late that now begins after others."""
-        return round(time / self.period) - steps if self._way == "clock" else 0
-
-
 #: How many words of the sentence are passed at most after own subactions, whatever others choose.
 OwnWords = Callable[[Sequence[str | None]], int]
 #: Metres x, metres y, heading in radians (0: to the right, counterclockwise).
@@ -145,13 +94,21 @@ class OwnStep:
 
 
 class Robot:
-    """One robot.
+    """One robot, which keeps step with all ``robots`` in a ``way``, as ``--step`` has it.
 
-    ``radius`` is its own, in metres.  It follows ``monitor``, its choices, and draws among them
-    with ``random``.  ``points`` are the places in metres, ``leads`` the place that each own
-    subaction leads to, if it leads anywhere.  ``words`` says how far in the sentence own subactions
-    may lead; None where no sentence is agreed.  ``wishes`` are the atoms that it comes to want to
-    visit when it has done so many steps.
+    - ``clock``: step k begins k periods after the start, by a clock that all robots have.
+    - ``barrier``: step k begins when every robot has told that it has done k steps.
+    - ``word``: a robot goes on as soon as it has done a step.  Only where the next word may have
+      begun it tells so, and waits until every robot has.
+    - ``passings``: there are no steps.  A robot starts an event when those of others that it waits
+      for have ended, which they tell if it matters to somebody, and so that they are ready for a
+      meeting.
+
+    A ``period`` is in seconds.  ``radius`` is its own, in metres.  It follows ``monitor``, its
+    choices, and draws among them with ``random``.  ``points`` are the places in metres, ``leads``
+    the place that each own subaction leads to, if it leads anywhere.  ``words`` says how far in the
+    sentence own subactions may lead; None where no sentence is agreed.  ``wishes`` are the atoms
+    that it comes to want to visit when it has done so many steps.
     """
 
     def __init__(
@@ -162,14 +119,19 @@ class Robot:
         leads: Mapping[str, str],
         monitor: Monitor,
         words: OwnWords | None,
-        pace: Pace,
+        way: str,
+        period: float,
+        robots: Iterable[str],
         random: Random,
         wishes: Mapping[int, Sequence[str]],
     ) -> None:
         self.name = name
         self.steps: list[OwnStep] = []
         self._radius, self._points, self._leads = radius, points, leads
-        self._monitor, self._pace = monitor, pace
+        self._monitor, self._way, self._period = monitor, way, period
+        self._heard = dict.fromkeys(robots, 0)
+        #: Whether all robots turn in the same time before they drive, and idle without time.
+        self._is_common = way in ("clock", "barrier")
         self._random, self._own_words, self._wishes = random, words, dict(wishes)
         #: Own steps done, and words of the sentence passed at most, by its own account.
         self.done = self.words = 0
@@ -184,14 +146,14 @@ class Robot:
     @property
     def finished(self) -> bool:
         """Whether all own steps are done."""
-        return self._monitor.finished and not self._is_underway
+        return self._monitor.finished
 
     def subplan(self) -> list[str | None]:
         """What it chose, and would choose in the steps that it has not begun."""
         ahead, random = self._monitor.copy(), Random()
         random.setstate(self._random.getstate())
         chosen = [step.subaction for step in self.steps]
-        if isinstance(ahead, EventMonitor) and self._is_underway:
+        if self._is_underway:
             ahead.did(chosen[-1])
         if self._chosen is not None:
             chosen.append(self._chosen)
@@ -207,16 +169,15 @@ class Robot:
         ``time`` are seconds since the start, ``pose`` is where it believes to be; it has a lidar to
         ``look`` ahead with, or none.  ``heard`` are the messages of the tick before.
         """
-        self._pace.hears(heard)
-        if isinstance(self._monitor, EventMonitor):
-            self._hear_of_events(self._monitor, heard)
+        for notice in heard:
+            self._hears(notice)
         if not self._is_underway:
             self._heed_wishes()
             if not self._begins(time):
                 return STANDING
         step = self.steps[-1]
         if step.place is None:
-            has_ended = self._pace.is_common or time >= step.begin + self._pace.period
+            has_ended = self._is_common or time >= step.begin + self._period
         else:
             has_ended = math.dist(pose[:2], self._points[step.place]) < _ARRIVED
         if has_ended:
@@ -227,8 +188,7 @@ class Robot:
 
     def _begins(self, time: float) -> bool:
         """Begin the next step now, if there is one and nothing keeps it back."""
-        begun = self.steps[-1].begin if self.steps else -1.0
-        if self._monitor.finished or not self._pace.may_begin(self.done, self.words, begun, time):
+        if self._monitor.finished or not self._may_begin(time):
             return False
         if isinstance(self._monitor, EventMonitor):
             chosen = self._started(self._monitor)
@@ -236,9 +196,22 @@ class Robot:
                 return False
         else:
             chosen = drawn(self._monitor, self._random, self._monitor.allowed())
-            self._monitor.did(chosen)
-        self._begin(chosen, time)
+        place = self._leads.get(chosen) if chosen is not None else None
+        self.steps.append(OwnStep(self.done, chosen, place, time))
+        self._is_turning = place is not None
+        missed = round(time / self._period) - self.done if self._way == "clock" else 0
+        if missed > self._missed:
+            self._events.append(("missed", {}))
+        self._missed = missed
         return True
+
+    def _may_begin(self, time: float) -> bool:
+        """Whether a step may begin.  By the clock, who is late misses a beginning."""
+        if self._way == "clock":
+            begun = self.steps[-1].begin if self.steps else -1.0
+            return abs(math.remainder(time, self._period)) < _SAME and begun < time
+        own = {"barrier": self.done, "word": self.words}.get(self._way, 0)
+        return all(heard >= own for heard in self._heard.values())
 
     def told(self) -> tuple[list[Notice], list[Event]]:
         """What it has told all robots since this was asked last, and what is worth recording."""
@@ -258,47 +231,35 @@ class Robot:
     def _is_underway(self) -> bool:
         return bool(self.steps) and self.steps[-1].end is None
 
-    def _hear_of_events(self, monitor: EventMonitor, heard: Sequence[Notice]) -> None:
-        for message in heard:
-            if message.sender == self.name:
-                continue
-            try:
-                if message.kind == "ended":
-                    monitor.ended(message.sender, message.subaction, message.number)
-                else:
-                    monitor.ready(message.sender, message.subaction)
-            except NotPossible:  # they have agreed on nothing
-                self._events.append(("contradicted", {}))
+    def _hears(self, notice: Notice) -> None:
+        name, monitor = notice.sender, self._monitor
+        self._heard[name] = max(self._heard[name], notice.number)
+        if not isinstance(monitor, EventMonitor) or name == self.name:
+            return
+        try:
+            if notice.kind == "ended":
+                monitor.ended(name, notice.subaction, notice.number)
+            else:
+                monitor.ready(name, notice.subaction)
+        except NotPossible:  # they have agreed on nothing
+            self._events.append(("contradicted", {}))
 
     def _started(self, monitor: EventMonitor) -> str | None:
         """The event that starts now, of those that are free; None: there is none, or it waits."""
         if self._chosen is None and (free := monitor.free()):
-            self._choose(monitor, drawn(monitor, self._random, free))
+            self._chosen = drawn(monitor, self._random, free)
+            if self._chosen is None:
+                monitor.did(None)
+            elif monitor.partners(self._chosen):
+                self._tell("ready", self.done + 1, monitor.subaction(self._chosen))
         if self._chosen is None or monitor.missing(self._chosen):
             return None
         event, self._chosen = self._chosen, None
         monitor.start(event)
         return event
 
-    def _choose(self, monitor: EventMonitor, event: str | None) -> None:
-        """Settle on an event, and tell its partners; or do no more."""
-        self._chosen = event
-        if event is None:
-            monitor.did(None)
-        elif monitor.partners(event):
-            self._tell("ready", self.done + 1, monitor.subaction(event))
-
     def _tell(self, kind: Kind, number: int, subaction: str = "") -> None:
         self._messages.append(Notice(self.name, kind, number, subaction))
-
-    def _begin(self, subaction: str | None, time: float) -> None:
-        place = self._leads.get(subaction) if subaction is not None else None
-        self.steps.append(OwnStep(self.done, subaction, place, time))
-        self._is_turning = place is not None
-        missed = self._pace.missed(self.done, time)
-        if missed > self._missed:
-            self._events.append(("missed", {}))
-        self._missed = missed
 
     def _finish(self, step: OwnStep, time: float) -> None:
         before, words = self.words, None
@@ -307,14 +268,15 @@ class Robot:
             self.words = words = max(before, words)
         self.steps[-1] = replace(step, end=time, words=words)
         self.done += 1
+        self._monitor.did(step.subaction)
         if isinstance(self._monitor, EventMonitor):
-            self._monitor.did(step.subaction)
             if step.subaction and self._monitor.concerns(step.subaction):
                 self._tell("ended", self.done, self._monitor.subaction(step.subaction))
-        for kind, number in self._pace.told(self.done, self.words, self.words > before):
-            self._tell(kind, number)
-            if kind == "word":
-                self._events.append(("word", {}))
+        elif self._way == "barrier":
+            self._tell("step", self.done)
+        elif self._way == "word" and self.words > before:
+            self._tell("word", self.words)
+            self._events.append(("word", {}))
 
     def _driven(
         self, target: tuple[float, float], since: float, pose: Pose, look: Look | None
@@ -327,7 +289,7 @@ class Robot:
         angle = math.remainder(math.atan2(target[1] - y, target[0] - x) - heading, 2 * math.pi)
         turn = max(-TURN, min(TURN, _GAIN * angle))
         if self._is_turning:
-            waits = self._pace.is_common and since < _TURNING
+            waits = self._is_common and since < _TURNING
             if waits or abs(angle) >= _ALIGNED:
                 return 0.0, turn
             self._is_turning = False

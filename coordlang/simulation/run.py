@@ -21,7 +21,7 @@ from coordlang.simulation.record import (
     StepRecord,
     WishRecord,
 )
-from coordlang.simulation.robot import TICK, Notice, Pace, Pose, Robot, period
+from coordlang.simulation.robot import TICK, Notice, Pose, Robot, period
 from coordlang.simulation.simulator import POSITION_NOISE, WALL, Floor, Settings, Simulator
 from coordlang.simulation.team import Mission
 
@@ -105,7 +105,9 @@ class _Going:
                 floor.points,
                 mission.leads[name],
                 *given,
-                Pace(settings.step, mission.robots, self.period),
+                settings.step,
+                self.period,
+                mission.robots,
                 Random(f"{seed} choices {name}"),
                 wished[name],
             )
@@ -117,8 +119,8 @@ class _Going:
             heading = Random(f"{seed} heading {name}").uniform(-math.pi, math.pi)
             poses[name] = (*floor.points[place], heading)
         self.simulator = Simulator(floor, poses, settings, seed)
-        self.ticks = self.messages = self.collisions = self.changes = 0
-        self.last_change, self.nearest = 0.0, math.inf
+        self.ticks = self.messages = 0
+        self.nearest = math.inf
         self.heard: tuple[Notice, ...] = ()
         self.touching: set[tuple[str, str]] = set()
         self.events: list[EventRecord] = []
@@ -134,7 +136,10 @@ class _Going:
 
     @property
     def has_ended(self) -> bool:
-        return self.has_arrived or self.time - self.last_change > _PATIENCE * self.period
+        last = [step for robot in self.robots.values() for step in robot.steps[-1:]]
+        changes = (step.begin if step.end is None else step.end for step in last)
+        waited = self.time - max(changes, default=0.0)
+        return self.has_arrived or waited > _PATIENCE * self.period
 
     def tick(self) -> None:
         """Let a tick pass: sense, choose, tell, move."""
@@ -149,9 +154,6 @@ class _Going:
             self.messages += len(messages)
             for kind, further in events:
                 self._event(kind, [name], **further)
-        changes = sum(len(robot.steps) + robot.done for robot in self.robots.values())
-        if changes > self.changes:
-            self.changes, self.last_change = changes, self.time
         self.simulator.tick(velocities)
         self.ticks += 1
         self._see_collisions()
@@ -166,7 +168,8 @@ class _Going:
             for name, robot in self.robots.items()
             for one in robot.steps
         ]
-        has_arrived, is_stuck = self.has_arrived, not self.has_arrived and not self.collisions
+        collisions = sum(event.kind == "collision" for event in self.events)
+        has_arrived, is_stuck = self.has_arrived, not self.has_arrived and not collisions
         seconds, late = self.time, 0
         if has_arrived:
             self._event("arrived", list(self.robots))
@@ -177,7 +180,7 @@ class _Going:
         subplans = {name: robot.subplan() for name, robot in self.robots.items()}
         return RunRecord(
             seed=self.seed,
-            collisions=self.collisions,
+            collisions=collisions,
             deadlock=is_stuck,
             late=late,
             messages=self.messages,
@@ -199,7 +202,6 @@ class _Going:
     def _see_collisions(self) -> None:
         touching = self.simulator.touching()
         for pair in sorted(touching - self.touching):
-            self.collisions += 1
             robots = [name for name in pair if name in self.robots]
             self._event("collision", robots, touched="wall" if WALL in pair else None)
         self.touching = touching

@@ -160,8 +160,8 @@ class Settings:
     """How robots are built and keep step.
 
     ``radius`` is a robot's, in metres, as coordinates of places are.
-    ``step`` is the way of a `coordlang.simulation.robot.Pace`.  ``noise`` is the standard deviation
-    of what wheels do, as a share of what they are told, drawn anew in each tick; a tenth of it, in
+    ``step`` is a way of `coordlang.simulation.robot.Robot`.  ``noise`` is the standard deviation of
+    what wheels do, as a share of what they are told, drawn anew in each tick; a tenth of it, in
     metres and in radians, is that of where a robot believes to be.  ``lidar``: robots stop before
     what a lidar sees straight ahead.
     """

@@ -287,6 +287,7 @@ def test_films_have_the_frames_that_are_drawn() -> None:
     found = record()
     (run,) = found.runs
     assert "nobody moves any more" in {event_text(event) for event in run.events}
+    assert "word 1" in event_text(EventRecord(0.0, "word", ["r1"]))  # a file may leave out words
     poses = {name: own[:5] for name, own in run.poses.items()}
     run = msgspec.structs.replace(run, poses=poses)
     drawn = list(frames(found, run))
