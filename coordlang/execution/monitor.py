@@ -600,21 +600,26 @@ def _check_shape(value: Any, shape: Any, where: str, *keys: str) -> None:
     Its shape is a type; `_PDDL`, for a text as `_plain` makes it; [that of each]; or {that of each
     key: that of each value}.
     """
-    kind: Any = shape if isinstance(shape, type) else type(shape)
     if shape is _PDDL:
-        if not isinstance(value, str) or not value.isprintable() or _plain_or_none(value) != value:
-            raise _broken(f"{where}: '{keys[0]}' has {_shown(value)} in place of {_PDDL}")
-    elif not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        at = ": ".join(f"'{_shown(key)}'" for key in keys)
-        raise _broken(f"{where}: {at} is {_shown(value)}, not {_KINDS[kind]}")
-    elif shape is str and not value.isprintable():
+        _check_plain(value, f"{where}: '{keys[0]}'")
+        return
+    kind: Any = shape if isinstance(shape, type) else type(shape)
+    if not isinstance(value, kind) or isinstance(value, bool):
+        at = ": ".join(map("'{}'".format, map(_shown, keys)))
+        raise _broken(f"{where}: {at} is {_shown(value)}, not {_KINDS.get(kind, 'a count')}")
+    if kind is str and not value.isprintable():
         raise _broken(f"{where}: '{keys[0]}' holds control characters: {_shown(value)}")
-    elif kind is not shape:
+    if kind is not shape:
+        (of_each,) = shape
         for inner in value:
-            of_each = shape[0] if kind is list else next(iter(shape))
             _check_shape(inner, of_each, where, *keys)
             if kind is dict:
                 _check_shape(value[inner], shape[of_each], where, keys[0], inner)
+
+
+def _check_plain(text: Any, where: str) -> None:
+    if not isinstance(text, str) or not text.isprintable() or _plain_or_none(text) != text:
+        raise _broken(f"{where} has {_shown(text)} in place of {_PDDL}")
 
 
 def _entry(choices: Iterable[Any], robot: str | None) -> Mapping[str, Any]:
@@ -651,19 +656,18 @@ def _read_states(entry: Mapping[str, Any], written: dict[str, str]) -> list[_Sta
         record, step = records[number], records[number]["step"]
         moves = _moves(record["next"], number, step + 1, states, written)
         reached.update(moves.values())
-        if not moves and step != last:
+        if bool(moves) != (step < last):
             raise MonitorError(f"state {number} ends after {step} of {last} steps")
         left = sum(states[to].left for to in moves.values()) or 1
         _check_count(record["left"], left, f"state {number}")
         states[number] = _State(step, _known(record, entry["facts"], number), moves, left)
     if lost := states.keys() - reached:
         raise MonitorError(f"state {min(lost)} cannot be reached from state 0")
-    if "steps" in entry:
-        _check(entry, {"steps": int}, "a robot's choices")
-        if entry["steps"] != last:
-            raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {last}")
-    if "subplans" in entry:
-        _check_count(entry["subplans"], states[0].left, "a robot's choices")
+    whole = {"steps": last, "subplans": states[0].left, **entry}
+    _check(whole, {"steps": int}, "a robot's choices")
+    if whole["steps"] != last:
+        raise MonitorError(f"'steps' is {_shown(whole['steps'])}, but the states have {last}")
+    _check_count(whole["subplans"], states[0].left, "a robot's choices")
     return [*reversed(states.values())]
 
 
@@ -678,7 +682,7 @@ def _moves(
     moves: dict[str | None, int] = {}
     for text, to in following.items():
         if text not in written:
-            _check_shape(text, _PDDL, f"state {number}", "next")
+            _check_plain(text, f"state {number}: 'next'")
             written[text] = text
         if not _is_number(to) or to not in states or states[to].step != step:
             raise MonitorError(f"state {number} does not lead to a state of step {step}")

@@ -119,7 +119,7 @@ class _Going:
             heading = Random(f"{seed} heading {name}").uniform(-math.pi, math.pi)
             poses[name] = (*floor.points[place], heading)
         self.simulator = Simulator(floor, poses, settings, seed)
-        self.ticks = self.messages = 0
+        self.ticks = self.messages = self.collisions = 0
         self.nearest = math.inf
         self.heard: tuple[Notice, ...] = ()
         self.touching: set[tuple[str, str]] = set()
@@ -168,8 +168,7 @@ class _Going:
             for name, robot in self.robots.items()
             for one in robot.steps
         ]
-        collisions = sum(event.kind == "collision" for event in self.events)
-        has_arrived, is_stuck = self.has_arrived, not self.has_arrived and not collisions
+        has_arrived, is_stuck = self.has_arrived, not self.has_arrived and not self.collisions
         seconds, late = self.time, 0
         if has_arrived:
             self._event("arrived", list(self.robots))
@@ -180,7 +179,7 @@ class _Going:
         subplans = {name: robot.subplan() for name, robot in self.robots.items()}
         return RunRecord(
             seed=self.seed,
-            collisions=collisions,
+            collisions=self.collisions,
             deadlock=is_stuck,
             late=late,
             messages=self.messages,
@@ -202,6 +201,7 @@ class _Going:
     def _see_collisions(self) -> None:
         touching = self.simulator.touching()
         for pair in sorted(touching - self.touching):
+            self.collisions += 1
             robots = [name for name in pair if name in self.robots]
             self._event("collision", robots, touched="wall" if WALL in pair else None)
         self.touching = touching
