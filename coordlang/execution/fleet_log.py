@@ -9,6 +9,7 @@ others.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
@@ -60,12 +61,12 @@ class LogPart(Struct, frozen=True):
     events: tuple[Event, ...] = ()
 
 
+@dataclass(slots=True)
 class RobotLog:
     """All that is known of what one robot did: its events, and its `Version`."""
 
-    def __init__(self) -> None:
-        self.events: list[Event] = []
-        self.version = Version()
+    events: list[Event] = field(default_factory=list)
+    version: Version = field(default_factory=Version)
 
     def advance(self, **changed: Any) -> None:
         """Change the version."""
@@ -151,6 +152,7 @@ def decoded(data: bytes, run: str, robot: str, others: Sequence[str]) -> Message
     return message
 
 
+@dataclass(slots=True)
 class Agreement:
     """How far one robot has come in agreeing with the ``others`` on a sentence, by three messages.
 
@@ -164,22 +166,16 @@ class Agreement:
     best sentence by wishes in order of weight, ``grants`` says whether a sentence grants wishes.
     """
 
-    def __init__(
-        self,
-        robot: str,
-        others: Sequence[str],
-        sentence: str | None,
-        wishes: Sequence[str],
-        best: Callable[[Sequence[str]], str],
-        grants: Callable[[str, Sequence[str]], bool],
-    ) -> None:
-        self.robot, self.others = robot, tuple(others)
-        self.sentence, self._wishes = sentence, tuple(wishes)
-        self._best, self._grants = best, grants
-        self._proposal: str | None = None
-        self._answer: Reply | None = None
-        self._heard: dict[str, Message] = {}
-        self._said = self.said()
+    robot: str
+    others: Sequence[str]
+    sentence: str | None
+    wishes: tuple[str, ...]
+    best: Callable[[Sequence[str]], str]
+    grants: Callable[[str, Sequence[str]], bool]
+    _proposal: str | None = None
+    _answer: Reply | None = None
+    _heard: dict[str, Message] = field(default_factory=dict)
+    _said: dict[str, Any] = field(default_factory=dict)
 
     def check(self, message: Message) -> None:
         """Raise `Refuted` if another robot follows another sentence."""
@@ -201,7 +197,7 @@ class Agreement:
 
     def _talk(self) -> None:
         speakers = [name for name, message in self._heard.items() if message.speaks]
-        if self._wishes:
+        if self.wishes:
             speakers.append(self.robot)
         proposer = min(speakers or [self.robot, *self.others])
         if proposer == self.robot:
@@ -212,25 +208,25 @@ class Agreement:
     def _propose(self) -> None:
         """Propose the best sentence, and agree on one when all have answered."""
         if self._proposal is None:
-            self._proposal = self._best(self._wishes)
+            self._proposal = self.best(self.wishes)
         answers = [self._heard[name].answer for name in sorted(self.others)]
         given = [reply for reply in answers if reply and reply.sentence == self._proposal]
         if len(given) == len(self.others):
             further = [wish for reply in given for wish in reply.wishes]
-            self.sentence = self._best([*self._wishes, *further]) if further else self._proposal
+            self.sentence = self.best([*self.wishes, *further]) if further else self._proposal
 
     def _reply(self, proposed: str | None) -> None:
         """Accept what was proposed, or answer with own wishes, once."""
         answered = self._answer.sentence if self._answer else None
         if proposed is not None and proposed != answered:
-            is_granted = self._grants(proposed, self._wishes)
-            self._answer = Reply(proposed, () if is_granted else self._wishes)
+            is_granted = self.grants(proposed, self.wishes)
+            self._answer = Reply(proposed, () if is_granted else self.wishes)
 
     def said(self) -> dict[str, Any]:
         """What a message of this robot says of it."""
         return {
             "sentence": self.sentence,
-            "speaks": bool(self._wishes),
+            "speaks": bool(self.wishes),
             "proposes": self._proposal,
             "answer": self._answer,
         }

@@ -10,8 +10,8 @@ monitor only.  Numbers and texts are all that goes in and out, and what its lida
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from random import Random
 from typing import Literal
 
@@ -93,8 +93,9 @@ class OwnStep:
     words: int | None = None
 
 
+@dataclass(slots=True)
 class Robot:
-    """One robot, which keeps step with all ``robots`` in a ``way``, as ``--step`` has it.
+    """One robot, which keeps step with all others in a ``way``, as ``--step`` has it.
 
     - ``clock``: step k begins k periods after the start, by a clock that all robots have.
     - ``barrier``: step k begins when every robot has told that it has done k steps.
@@ -104,54 +105,47 @@ class Robot:
       for have ended, which they tell if it matters to somebody, and so that they are ready for a
       meeting.
 
-    A ``period`` is in seconds.  ``radius`` is its own, in metres.  It follows ``monitor``, its
-    choices, and draws among them with ``random``.  ``points`` are the places in metres, ``leads``
-    the place that each own subaction leads to, if it leads anywhere.  ``words`` says how far in the
-    sentence own subactions may lead; None where no sentence is agreed.  ``wishes`` are the atoms
-    that it comes to want to visit when it has done so many steps.
+    A ``period`` is in seconds; ``heard`` is how far each robot has told to be, 0 at the start.
+    ``radius`` is its own, in metres.  It follows ``monitor``, its choices, and draws among them
+    with ``random``.  ``points`` are the places in metres, ``leads`` the place that each own
+    subaction leads to, if it leads anywhere.  ``own_words`` says how far in the sentence own
+    subactions may lead; None where no sentence is agreed.  ``wishes`` are the atoms that it comes
+    to want to visit when it has done so many steps.  It has ``done`` so many ``steps``, and passed
+    so many ``words`` of the sentence at most, by its own account.
     """
 
-    def __init__(
-        self,
-        name: str,
-        radius: float,
-        points: Mapping[str, tuple[float, float]],
-        leads: Mapping[str, str],
-        monitor: Monitor,
-        words: OwnWords | None,
-        way: str,
-        period: float,
-        robots: Iterable[str],
-        random: Random,
-        wishes: Mapping[int, Sequence[str]],
-    ) -> None:
-        self.name = name
-        self.steps: list[OwnStep] = []
-        self._radius, self._points, self._leads = radius, points, leads
-        self._monitor, self._way, self._period = monitor, way, period
-        self._heard = dict.fromkeys(robots, 0)
-        #: Whether all robots turn in the same time before they drive, and idle without time.
-        self._is_common = way in ("clock", "barrier")
-        self._random, self._own_words, self._wishes = random, words, dict(wishes)
-        #: Own steps done, and words of the sentence passed at most, by its own account.
-        self.done = self.words = 0
-        self._is_turning = False
-        self._messages: list[Notice] = []
-        self._events: list[Event] = []
-        #: The event that it has chosen and not started, where there are no steps.
-        self._chosen: str | None = None
-        #: Beginnings missed, the step in which it was stopped.
-        self._missed, self._stopped_in = 0, -1
+    name: str
+    radius: float
+    points: Mapping[str, tuple[float, float]]
+    leads: Mapping[str, str]
+    monitor: Monitor
+    own_words: OwnWords | None
+    way: str
+    period: float
+    heard: dict[str, int]
+    random: Random
+    wishes: dict[int, list[str]]
+    steps: list[OwnStep] = field(default_factory=list)
+    done: int = 0
+    words: int = 0
+    _is_turning: bool = False
+    _messages: list[Notice] = field(default_factory=list)
+    _events: list[Event] = field(default_factory=list)
+    #: The event that it has chosen and not started, where there are no steps.
+    _chosen: str | None = None
+    #: Beginnings missed, the step in which it was stopped.
+    _missed: int = 0
+    _stopped_in: int = -1
 
     @property
-    def finished(self) -> bool:
-        """Whether all own steps are done."""
-        return self._monitor.finished
+    def _is_common(self) -> bool:
+        """Whether all robots turn in the same time before they drive, and idle without time."""
+        return self.way in ("clock", "barrier")
 
     def subplan(self) -> list[str | None]:
         """What it chose, and would choose in the steps that it has not begun."""
-        ahead, random = self._monitor.copy(), Random()
-        random.setstate(self._random.getstate())
+        ahead, random = self.monitor.copy(), Random()
+        random.setstate(self.random.getstate())
         chosen = [step.subaction for step in self.steps]
         if self._is_underway:
             ahead.did(chosen[-1])
@@ -177,29 +171,29 @@ class Robot:
                 return STANDING
         step = self.steps[-1]
         if step.place is None:
-            has_ended = self._is_common or time >= step.begin + self._period
+            has_ended = self._is_common or time >= step.begin + self.period
         else:
-            has_ended = math.dist(pose[:2], self._points[step.place]) < _ARRIVED
+            has_ended = math.dist(pose[:2], self.points[step.place]) < _ARRIVED
         if has_ended:
             self._finish(step, time)
         if has_ended or step.place is None:
             return STANDING
-        return self._driven(self._points[step.place], time - step.begin, pose, look)
+        return self._driven(self.points[step.place], time - step.begin, pose, look)
 
     def _begins(self, time: float) -> bool:
         """Begin the next step now, if there is one and nothing keeps it back."""
-        if self._monitor.finished or not self._may_begin(time):
+        if self.monitor.finished or not self._may_begin(time):
             return False
-        if isinstance(self._monitor, EventMonitor):
-            chosen = self._started(self._monitor)
+        if isinstance(self.monitor, EventMonitor):
+            chosen = self._started(self.monitor)
             if chosen is None:
                 return False
         else:
-            chosen = drawn(self._monitor, self._random, self._monitor.allowed())
-        place = self._leads.get(chosen) if chosen is not None else None
+            chosen = drawn(self.monitor, self.random, self.monitor.allowed())
+        place = self.leads.get(chosen) if chosen is not None else None
         self.steps.append(OwnStep(self.done, chosen, place, time))
         self._is_turning = place is not None
-        missed = round(time / self._period) - self.done if self._way == "clock" else 0
+        missed = round(time / self.period) - self.done if self.way == "clock" else 0
         if missed > self._missed:
             self._events.append(("missed", {}))
         self._missed = missed
@@ -207,11 +201,11 @@ class Robot:
 
     def _may_begin(self, time: float) -> bool:
         """Whether a step may begin.  By the clock, who is late misses a beginning."""
-        if self._way == "clock":
+        if self.way == "clock":
             begun = self.steps[-1].begin if self.steps else -1.0
-            return abs(math.remainder(time, self._period)) < _SAME and begun < time
-        own = {"barrier": self.done, "word": self.words}.get(self._way, 0)
-        return all(heard >= own for heard in self._heard.values())
+            return abs(math.remainder(time, self.period)) < _SAME and begun < time
+        own = {"barrier": self.done, "word": self.words}.get(self.way, 0)
+        return all(heard >= own for heard in self.heard.values())
 
     def told(self) -> tuple[list[Notice], list[Event]]:
         """What it has told all robots since this was asked last, and what is worth recording."""
@@ -221,10 +215,10 @@ class Robot:
 
     def _heed_wishes(self) -> None:
         """Commit to what is wanted from now on, where its choices allow it."""
-        for atom in () if self._monitor.finished else self._wishes.pop(self.done, ()):
-            granted = bool(self._monitor.can(visit=atom))
+        for atom in () if self.monitor.finished else self.wishes.pop(self.done, ()):
+            granted = bool(self.monitor.can(visit=atom))
             if granted:
-                self._monitor.commit(visit=atom)
+                self.monitor.commit(visit=atom)
             self._events.append(("detour", {"visit": atom, "granted": granted}))
 
     @property
@@ -232,8 +226,8 @@ class Robot:
         return bool(self.steps) and self.steps[-1].end is None
 
     def _hears(self, notice: Notice) -> None:
-        name, monitor = notice.sender, self._monitor
-        self._heard[name] = max(self._heard[name], notice.number)
+        name, monitor = notice.sender, self.monitor
+        self.heard[name] = max(self.heard[name], notice.number)
         if not isinstance(monitor, EventMonitor) or name == self.name:
             return
         try:
@@ -247,7 +241,7 @@ class Robot:
     def _started(self, monitor: EventMonitor) -> str | None:
         """The event that starts now, of those that are free; None: there is none, or it waits."""
         if self._chosen is None and (free := monitor.free()):
-            self._chosen = drawn(monitor, self._random, free)
+            self._chosen = drawn(monitor, self.random, free)
             if self._chosen is None:
                 monitor.did(None)
             elif monitor.partners(self._chosen):
@@ -263,18 +257,18 @@ class Robot:
 
     def _finish(self, step: OwnStep, time: float) -> None:
         before, words = self.words, None
-        if self._own_words is not None:
-            words = self._own_words([own.subaction for own in self.steps])
+        if self.own_words is not None:
+            words = self.own_words([own.subaction for own in self.steps])
             self.words = words = max(before, words)
         self.steps[-1] = replace(step, end=time, words=words)
         self.done += 1
-        self._monitor.did(step.subaction)
-        if isinstance(self._monitor, EventMonitor):
-            if step.subaction and self._monitor.concerns(step.subaction):
-                self._tell("ended", self.done, self._monitor.subaction(step.subaction))
-        elif self._way == "barrier":
+        self.monitor.did(step.subaction)
+        if isinstance(self.monitor, EventMonitor):
+            if step.subaction and self.monitor.concerns(step.subaction):
+                self._tell("ended", self.done, self.monitor.subaction(step.subaction))
+        elif self.way == "barrier":
             self._tell("step", self.done)
-        elif self._way == "word" and self.words > before:
+        elif self.way == "word" and self.words > before:
             self._tell("word", self.words)
             self._events.append(("word", {}))
 
@@ -295,7 +289,7 @@ class Robot:
             self._is_turning = False
             if look is not None:  # it looks while it drives
                 return STANDING
-        room = ((look() if look else math.inf) - (self._radius + 0.03)) / _REACTION
+        room = ((look() if look else math.inf) - (self.radius + 0.03)) / _REACTION
         if room <= 0 and self._stopped_in != self.done:
             self._stopped_in = self.done
             self._events.append(("stopped", {}))

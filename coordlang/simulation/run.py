@@ -107,7 +107,7 @@ class _Going:
                 *given,
                 settings.step,
                 self.period,
-                mission.robots,
+                dict.fromkeys(mission.robots, 0),
                 Random(f"{seed} choices {name}"),
                 wished[name],
             )
@@ -132,7 +132,7 @@ class _Going:
 
     @property
     def has_arrived(self) -> bool:
-        return all(robot.finished for robot in self.robots.values())
+        return all(robot.monitor.finished for robot in self.robots.values())
 
     @property
     def has_ended(self) -> bool:
