@@ -27,7 +27,7 @@ from coordlang.required.miscoordination import Miscoordination, Trail, describe_
 from planners.joint.conditions import Labels
 from planners.joint.tables import Ints, ranges, unique_rows
 from planners.search.edge_index import EdgeIndex
-from planners.search.plan_space import PlanSpace, UnfoldingStep
+from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
 from planners.system.limits import reaching
 
@@ -214,7 +214,7 @@ def walk_mixtures(
     robots, moves = len(automata), [_Moves(own) for own in automata]
     table = np.array([[0] * robots + [task_language.start]])
     layers = [table[:, robots]]
-    steps: list[UnfoldingStep] = []
+    steps: list[tuple[Ints, Ints, Ints]] = []
     walked, made = 1, 0.0
     for _ in range(automata[0].steps):
         degrees = [own.degree[at] for own, at in zip(moves, table.T, strict=False)]
@@ -231,10 +231,10 @@ def walk_mixtures(
             return Mixtures(None, _witness(task_language, fits, words, steps, *last), walked)
         reached = np.column_stack((after, space.targets(edge)))
         table, number = unique_rows(reached)
-        steps.append(UnfoldingStep(source, edge, number))
+        steps.append((source, edge, number))
         layers.append(table[:, robots])
         walked += len(table)
-    found = PlanSpace.from_layers(space, layers, steps, task_language.task)
+    found = space.unfolded(layers, steps, task_language.task)
     return Mixtures(found, None, walked)
 
 
@@ -262,16 +262,16 @@ def _witness(
     task_language: TaskLanguage,
     fits: PlanSpace,
     words: Sequence[int],
-    steps: Sequence[UnfoldingStep],
+    steps: Sequence[tuple[Ints, Ints, Ints]],
     node: int,
     labels: tuple[int, ...],
 ) -> Miscoordination:
     """Plans with the sentence whose mixture breaks at a node of the last layer, by these labels."""
     space, start, done, paths = task_language.space, task_language.start, [labels], []
-    for step in reversed(steps):
-        arrival = int(np.flatnonzero(step.target == node)[0])
-        done.append(space.labels_of(int(step.edge[arrival])))
-        node = int(step.source[arrival])
+    for source, edge, target in reversed(steps):
+        arrival = int(np.flatnonzero(target == node)[0])
+        done.append(space.labels_of(int(edge[arrival])))
+        node = int(source[arrival])
     for robot in range(len(labels)):
         own = [[step[robot]] for step in reversed(done)]
         path = fits.path_of_robots(int(fits.starts[0]), [robot], own)

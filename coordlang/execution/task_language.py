@@ -21,7 +21,7 @@ from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
-from planners.search.plan_space import PlanSpace, UnfoldingStep
+from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, UsageError, note
 from planners.system.messages import Presented, echoed
 
@@ -144,7 +144,7 @@ class TaskLanguage:
         next_word = np.array([*words[1:], -1, -1])
         #: For each layer the node of ``space`` and the index in the sentence of its word.
         layers: list[tuple[Ints, Ints]] = [(np.array([self.start]), np.array([0]))]
-        steps: list[UnfoldingStep] = []
+        steps: list[tuple[Ints, Ints, Ints]] = []
         for _ in range(space.cost_of(self.task)[0]):
             node, index = layers[-1]
             source, edge = space.edges_from(node)
@@ -154,13 +154,13 @@ class TaskLanguage:
             code = target * length + before + changes
             reached, number = np.unique(code[fits], return_inverse=True)
             layers.append((reached // length, reached % length))
-            steps.append(UnfoldingStep(source[fits], edge[fits], number.reshape(-1)))
+            steps.append((source[fits], edge[fits], number.reshape(-1)))
         ends = layers[-1][1] == length - 1
         if not ends.any():
             furthest = max(int(index.max()) for _, index in layers if len(index))
             nodes = np.concatenate([node[index == furthest] for node, index in layers])
             raise NoPlanFits(self, words, furthest + 1, self._next_words(nodes))
-        return PlanSpace.from_layers(space, [node for node, _ in layers], steps, self.task, ends)
+        return space.unfolded([node for node, _ in layers], steps, self.task, ends)
 
     def _next_words(self, nodes: Ints) -> list[int | None]:
         """The words to which plans go on from some nodes of one word, None where they may end."""

@@ -36,18 +36,6 @@ class LayerEdges(NamedTuple):
     target: Ints
 
 
-class UnfoldingStep(NamedTuple):
-    """The edges from one layer of an unfolding to the next (`PlanSpace.from_layers`).
-
-    ``source`` numbers nodes of the upper layer, ``target`` of the lower one; ``edge`` is the edge
-    of the unfolded plan space that each stands for.  Sorted by source, then by labels.
-    """
-
-    source: Ints
-    edge: Ints
-    target: Ints
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanSpace:
     """The optimal plans of one or several tasks as paths of one layered graph.
@@ -324,42 +312,41 @@ class PlanSpace:
             starts=number[self.starts],
         )
 
-    @classmethod
-    def from_layers(
-        cls,
-        space: PlanSpace,
+    def unfolded(
+        self,
         layers: Sequence[Ints],
-        steps: Sequence[UnfoldingStep],
+        steps: Sequence[tuple[Ints, Ints, Ints]],
         task: int,
         ends: Bools | None = None,
     ) -> PlanSpace:
-        """A plan space of one task that unfolds part of ``space``: copies of its nodes and edges.
+        """A plan space of one task that unfolds part of this one: copies of its nodes and edges.
 
-        ``layers`` are, from the start down, the nodes of ``space`` that each layer's nodes are
-        copies of, ``steps`` the edges between consecutive layers.  The new task starts at the only
-        node of the first layer, and keeps the second cost component of ``task``.  What leads to
-        none of the ``ends`` (of the last layer's nodes; default: all) is left out; some path must
-        lead there.
+        ``layers`` are, from the start down, the nodes that each layer's nodes are copies of.
+        ``steps`` are between consecutive layers: the sources of edges, numbered in the upper one,
+        the edges that they are copies of, and their targets in the lower one; sorted by source,
+        then by labels.  The new task starts at the only node of the first layer, and keeps the
+        second cost component of ``task``.  What leads to none of the ``ends`` (of the last layer's
+        nodes; default: all) is left out; some path must lead there.
         """
         node = np.concatenate(layers[::-1])
         begins = np.cumsum([0, *map(len, layers[::-1])])[-2::-1]
         parts = [
-            (step.source + above, step.target + below, step.edge)
-            for step, (above, below) in zip(steps, pairwise(begins), strict=True)
+            (source + above, edge, target + below)
+            for (source, edge, target), (above, below) in zip(steps, pairwise(begins), strict=True)
         ]
         nothing = (np.zeros(0, np.int64),) * 3
-        source, target, edge = map(np.concatenate, zip(nothing, *reversed(parts), strict=True))
+        source, edge, target = map(np.concatenate, zip(nothing, *reversed(parts), strict=True))
         whole = replace(
-            space,
-            state=space.state[node],
-            goal=space.goal[node],
-            layer=space.layer[node],
+            self,
+            state=self.state[node],
+            goal=self.goal[node],
+            layer=self.layer[node],
             first=np.searchsorted(source, np.arange(len(node) + 1)),
             target=narrow(target),
-            labels=space.labels[edge],
-            cost=space.cost[edge],
+            labels=self.labels[edge],
+            cost=self.cost[edge],
             starts=np.array([len(node) - 1]),
-            second=space.second[[task]],
+            second=self.second[[task]],
         )
         lasts = np.arange(len(layers[-1]))
         return whole._cut(whole.ancestors(lasts if ends is None else lasts[ends]))
