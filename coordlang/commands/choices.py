@@ -91,7 +91,7 @@ class RobotsChoices(InTask):
     @property
     def witness(self) -> Miscoordination | None:
         """A combination that is no optimal plan, or None."""
-        return self.found.mixtures.witness if self.found.mixtures else None
+        return self.found.witness
 
     @property
     def subplans(self) -> dict[str, int]:
@@ -102,7 +102,7 @@ class RobotsChoices(InTask):
     @property
     def combinations_walked(self) -> int | None:
         """The number of nodes walked to check every combination, None where that was left out."""
-        return self.found.mixtures.nodes if self.found.mixtures else None
+        return self.found.walked
 
     def monitor(self, robot: str) -> Monitor:
         """A run-time monitor of one robot; `UsageError` if there is no such robot."""

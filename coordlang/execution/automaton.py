@@ -183,31 +183,19 @@ def _numbered(robot: int, merged: Sequence[Sequence[_State]]) -> Automaton:
 # ---- every combination of the robots' choices
 
 
-@dataclass(frozen=True, slots=True)
-class Mixtures:
-    """What the robots can do together when each takes its choices as it likes.
-
-    ``space``: all of it, as a plan space of one task; None if some combination is no optimal plan,
-    and then ``witness`` shows one.  ``nodes`` counts what was walked.
-    """
-
-    space: PlanSpace | None
-    witness: Miscoordination | None
-    nodes: int
-
-
 def walk_mixtures(
     task_language: TaskLanguage,
     fits: PlanSpace,
     automata: Sequence[Automaton],
     words: Sequence[int],
     most: int,
-) -> Mixtures | None:
+) -> tuple[PlanSpace | None, Miscoordination | None, int | None]:
     """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
 
-    At most (product of the automata's layers) * (layer of the plan space) nodes.  ``automata`` are
-    the robots' subplans in ``fits``, the plans with the sentence ``words``.  None, before they are
-    made, where there are more than ``most`` joint moves.
+    Returns all of them as a plan space of one task, or else one that is no optimal plan; and how
+    many nodes were walked, None, before they are made, where there are more than ``most`` joint
+    moves.  At most (product of the automata's layers) * (layer of the plan space) nodes.
+    ``automata`` are the robots' subplans in ``fits``, the plans with the sentence ``words``.
     """
     space = task_language.space
     index = EdgeIndex.of(space)
@@ -220,7 +208,7 @@ def walk_mixtures(
         degrees = [own.degree[at] for own, at in zip(moves, table.T, strict=False)]
         made += np.prod(degrees, axis=0, dtype=float).sum()
         if made > most:
-            return None
+            return None, None, None
         source, labels, after = _together(moves, table)
         edge = table[source, robots]
         for robot in range(robots):
@@ -228,14 +216,13 @@ def walk_mixtures(
         broken = np.flatnonzero(edge < 0)
         if len(broken):
             last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
-            return Mixtures(None, _witness(task_language, fits, words, steps, *last), walked)
+            return None, _witness(task_language, fits, words, steps, *last), walked
         reached = np.column_stack((after, space.targets(edge)))
         table, number = unique_rows(reached)
         steps.append((source, edge, number))
         layers.append(table[:, robots])
         walked += len(table)
-    found = space.unfolded(layers, steps, task_language.task)
-    return Mixtures(found, None, walked)
+    return space.unfolded(layers, steps, task_language.task), None, walked
 
 
 class _Moves:

@@ -19,18 +19,12 @@ import msgspec
 import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
-from coordlang.execution.automaton import (
-    Atoms,
-    Automaton,
-    Knowledge,
-    Mixtures,
-    determinise,
-    walk_mixtures,
-)
+from coordlang.execution.automaton import Atoms, Automaton, Knowledge, determinise, walk_mixtures
 from coordlang.execution.monitor import FORMAT, VERSION, EventMonitor, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
+from coordlang.required.miscoordination import Miscoordination
 from planners.joint.model import JointModel
 from planners.joint.states import bits
 from planners.joint.traces import Event, Traces
@@ -49,21 +43,23 @@ MOST = 2_000_000
 class SentenceChoices:
     """All robots' choices under one sentence of one task.
 
-    ``fits`` are the plans with the sentence, ``mixtures`` every combination of the choices, None
-    where there are too many to walk.
+    ``fits`` are the plans with the sentence, ``mixtures`` every combination of the choices, as a
+    plan space of one task; None if there are too many to walk, or if some combination is no optimal
+    plan, and then ``witness`` shows one.  So many nodes were ``walked``, None: too many.
     """
 
     task_language: TaskLanguage
     words: tuple[int, ...]
     fits: PlanSpace
     robots: tuple[Automaton, ...]
-    mixtures: Mixtures | None
+    mixtures: PlanSpace | None
+    witness: Miscoordination | None
+    walked: int | None
 
     @property
     def guaranteed(self) -> bool:
         """Whether every combination is optimal, by a walk of all or by the language's guarantee."""
-        found = self.mixtures
-        return self.task_language.guaranteed if found is None else found.witness is None
+        return self.witness is None and (self.walked is not None or self.task_language.guaranteed)
 
 
 def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST) -> SentenceChoices:
@@ -77,11 +73,11 @@ def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST)
     """
     fits, model = task_language.plans_with(words), task_language.model
     subplans = [determinise(fits, robot) for robot in range(len(model.robots))]
-    mixtures = None
+    mixtures, witness, walked = None, None, None
     with suppress(MemoryError):
-        mixtures = walk_mixtures(task_language, fits, subplans, words, most)
+        mixtures, witness, walked = walk_mixtures(task_language, fits, subplans, words, most)
     # Without a common step a node is no state in which a robot is when it has done its events.
-    space = mixtures.space if mixtures and not model.is_asynchronous else None
+    space = None if model.is_asynchronous else mixtures
     facts = [*map(model.codec.fact_bits, fits.rows)] if space else []
     truth = [facts[state] for state in space.state.tolist()] if space else []
     robots = []
@@ -90,7 +86,8 @@ def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST)
         with suppress(OutOfMemory):  # the combinations are checked all the same
             exact = space and determinise(space, robot, truth, most)
         robots.append(exact or knowing_own(fits, robot))
-    return SentenceChoices(task_language, tuple(words), fits, tuple(robots), mixtures)
+    found = mixtures, witness, walked
+    return SentenceChoices(task_language, tuple(words), fits, tuple(robots), *found)
 
 
 def knowing_own(fits: PlanSpace, robot: int) -> Automaton:
@@ -244,7 +241,7 @@ def to_record(choices: SentenceChoices, robots: Sequence[int] | None = None) -> 
         covered=task_language.covered,
         guaranteed=choices.guaranteed,
         tolerance=tolerance_data(task_language.language.tolerance).get("tolerance", UNSET),
-        combinations_walked=choices.mixtures.nodes if choices.mixtures is not None else None,
+        combinations_walked=choices.walked,
         choices=[_robot(choices.fits, choices.robots[robot]) for robot in chosen],
     )
 

@@ -90,8 +90,7 @@ def test_every_combination_is_optimal(robots: int, models: int) -> None:
         found = choices(task_language, words)
         assert found.guaranteed
         assert found.mixtures is not None
-        assert found.mixtures.space is not None
-        assert Plans.of(found.mixtures.space).count == twin.combinations
+        assert Plans.of(found.mixtures).count == twin.combinations
         assert all(own.atoms == "exact" for own in found.robots)
         check_automata(found, twin)
         seen["several for two"] += sum(len(own) > 1 for own in twin.own) > 1
@@ -116,8 +115,8 @@ def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
     seen: Counter[bool] = Counter()
     for _, task_language, words, twin in with_twins(in_random_words, robots, models):
         found = choices(task_language, words)
-        assert found.mixtures is not None
-        assert (found.mixtures.witness is None) == found.guaranteed == twin.mixes
+        assert found.walked is not None
+        assert (found.witness is None) == found.guaranteed == twin.mixes
         seen[twin.mixes] += 1
         if not twin.mixes:
             assert all(own.atoms == "own" for own in found.robots)
@@ -130,8 +129,7 @@ def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
 
 def check_violation(found: SentenceChoices, twin: Listed) -> None:
     """The plans shown have the sentence, and their mixture breaks where it says."""
-    assert found.mixtures is not None
-    shown = found.mixtures.witness
+    shown = found.witness
     assert shown is not None
     model = found.task_language.model
     followed = tuple(
@@ -155,7 +153,7 @@ def test_own_atoms_are_known(robots: int, models: int) -> None:
             continue
         found = choices(task_language, words, most=0)
         if len(found.robots[0].layers) > 1:
-            assert found.mixtures is None
+            assert found.walked is None
             check_automata(found, twin)
             for own in found.robots:
                 check_own_atoms(task_language, own, twin, seen)
@@ -211,7 +209,7 @@ def test_too_many_are_refused() -> None:
     fits = task_language.plans_with(words)
     with pytest.raises(OutOfMemory, match=r"Reached: 0 different histories"):
         determinise(fits, 0, most=0)
-    assert choices(task_language, words, most=0).mixtures is None
+    assert choices(task_language, words, most=0).walked is None
     assert choices(task_language, words, most=0).guaranteed
 
 
