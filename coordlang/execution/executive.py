@@ -111,7 +111,7 @@ class Executive:
         patience = _PATIENCE * self._silent_after
         return self.is_done and all(
             now - self._heard_at[name] >= patience
-            or (self._logs[name].version.is_done and not self._lacks_any(name))
+            or (self._logs[name].version.is_done and not self._lacked_by(name))
             for name in self.others
         )
 
@@ -219,7 +219,7 @@ class Executive:
         if message.late is not None:
             waits = self._monitor is not None and name in self._monitor.late()
             self.lines.append({"late": name, "seconds": message.late, "waiting": waits})
-        if is_new or not self._has_heard_us(name) or self._lacks_any(name):
+        if is_new or not self._has_heard_us(name) or self._lacked_by(name):
             self._to_tell.add(name)
 
     def _join(self, by: str, of: str, part: LogPart) -> None:
@@ -245,18 +245,19 @@ class Executive:
         """How far another robot knows a log."""
         return self._last[name].knows.get(of, Version())
 
-    def _lacks(self, name: str, of: str) -> bool:
-        """Whether another robot should be told of a log.
+    def _lacked_by(self, name: str) -> dict[str, LogPart]:
+        """What another robot lacks of logs and should be told.
 
         It is told this robot's own one, its own one if it was started again, and those of robots
         that may not speak themselves, as they are silent or have left.
         """
-        is_done = self._logs[of].version.is_done
-        speaks_itself = of not in {self.robot, name, *self._silent} and not is_done
-        return not speaks_itself and self._version_by(name, of).lacks(self._logs[of].version)
-
-    def _lacks_any(self, name: str) -> bool:
-        return any(self._lacks(name, of) for of in self._logs)
+        told = {self.robot, name, *self._silent}
+        return {
+            of: log.part(known)
+            for of, log in self._logs.items()
+            if (of in told or log.version.is_done)
+            and (known := self._version_by(name, of)).lacks(log.version)
+        }
 
     def messages(self) -> Iterator[tuple[str, bytes]]:
         """What is to be sent now: robots and messages; `unsent` tells what could not be sent."""
@@ -265,14 +266,9 @@ class Executive:
         lives = {name: message.life for name, message in self._last.items()}
         knows = {of: log.version for of, log in self._logs.items()}
         for name in names:
-            logs = {
-                of: log.part(self._version_by(name, of))
-                for of, log in self._logs.items()
-                if self._lacks(name, of)
-            }
             who, said = (self._run, self.robot, self.life), self._agreement.said()
             self.sent += 1
-            message = Message(*who, lives, knows, logs, late=late, **said)
+            message = Message(*who, lives, knows, self._lacked_by(name), late=late, **said)
             yield name, msgspec.json.encode(message)
 
     def unsent(self, name: str) -> bool:
