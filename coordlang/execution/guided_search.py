@@ -66,7 +66,7 @@ def plan_under_sentence(
     start, work = int(space.starts[task]), (0, 0, 0)
     path: list[int] | None = space.first_path(start)
     if not (space.model.slack or space.model.is_asynchronous):
-        plan, work = _a_star(_States(task_language, words, bound), words, count_words)
+        plan, work = _a_star(_States(task_language, words, bound), count_words)
         path = space.path_with(start, plan)
     assert path is not None, "A* is optimal"
     passed = task_language.partition.word_of(space.rows)[space.state[space.nodes_on(start, path)]]
@@ -84,9 +84,7 @@ def _earliest(space: PlanSpace) -> PlanSpace:
     return space.cheapest((~resting).astype(np.int64))
 
 
-def _a_star(
-    states: _States, words: Sequence[int] | None, count_words: bool
-) -> tuple[Plan, tuple[int, int, int]]:
+def _a_star(states: _States, count_words: bool) -> tuple[Plan, tuple[int, int, int]]:
     """Search for an optimal plan with a sentence that some optimal plan has; also tell the work.
 
     A node is a state, the *index* of its word in the sentence (0 without a sentence) and a cost.
@@ -100,7 +98,7 @@ def _a_star(
     bound, second component), then least bound, then the largest index, then the one whose
     predecessor was expanded last, then the one with the smallest labels.
     """
-    last = len(words or (0,)) - 1
+    last = len(states.words) - 1
     best: dict[bytes, Cost] = {states.init: (0, 0)}
     ways: Ways = {}
     queue: list[tuple[Cost, int, int, int, int, Node]] = []
@@ -131,7 +129,7 @@ def _a_star(
 class _States:
     """The states that a search meets: ``height`` are lower bounds of the joint steps from each.
 
-    They are 0 exactly where the goal holds.
+    They are 0 exactly where the goal holds.  Without a sentence all states have one word.
     """
 
     def __init__(
@@ -139,7 +137,8 @@ class _States:
     ) -> None:
         space, start = task_language.space, task_language.start
         goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
-        self.model, self.partition, self._words = space.model, task_language.partition, words
+        self.words, self._model = words or (0,), space.model
+        self._partition = None if words is None else task_language.partition
         self._bound = heuristic(bound, space.model, goal, init)
         self.height: dict[bytes, int] = {}
         (self.init,) = self._keys(init[None, :])
@@ -155,16 +154,14 @@ class _States:
     def steps(self, node: Node) -> Iterator[Step]:
         """The joint steps out of a node that fit the sentence and may lead to the goal."""
         state, index, (steps, second) = node
-        found = self.model.successors(np.frombuffer(state, np.uint64)[None, :])
-        goes_on, kept = np.zeros(len(found.result), np.int64), np.arange(len(found.result))
-        if self._words is not None:
-            word = self.partition.word_of(found.result)
-            goes_on = (word != self._words[index]).astype(np.int64)
-            kept = np.flatnonzero(np.isin(word, self._words[index : index + 2]))
-        for number, target in zip(kept.tolist(), self._keys(found.result[kept]), strict=True):
+        found = self._model.successors(np.frombuffer(state, np.uint64)[None, :])
+        rows, words = found.result, self.words[index : index + 2]
+        word = np.zeros(len(rows)) if self._partition is None else self._partition.word_of(rows)
+        kept = np.flatnonzero(np.isin(word, words))
+        for number, target in zip(kept.tolist(), self._keys(rows[kept]), strict=True):
             if self.height[target] < FAR:
                 cost = steps + 1, second + int(found.cost[number])
-                to = target, index + int(goes_on[number]), cost
+                to = target, index + int(word[number] != words[0]), cost
                 yield number, to, tuple(found.labels[number].tolist())
 
 
