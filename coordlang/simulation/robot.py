@@ -19,6 +19,8 @@ from coordlang.execution.monitor import EventMonitor, Monitor, NotPossible, draw
 
 Kind = Literal["step", "word", "ended", "ready"]
 
+#: Ways in which all robots turn in the same time before they drive, and idle without time.
+_COMMON = ("clock", "barrier")
 #: Seconds by which times may differ that are the same: sums of ticks.
 _SAME = 1e-6
 
@@ -111,7 +113,8 @@ class Robot:
     subaction leads to, if it leads anywhere.  ``own_words`` says how far in the sentence own
     subactions may lead; None where no sentence is agreed.  ``wishes`` are the atoms that it comes
     to want to visit when it has done so many steps.  It has ``done`` so many ``steps``, and passed
-    so many ``words`` of the sentence at most, by its own account.
+    so many ``words`` of the sentence at most, by its own account.  ``messages`` are for all robots,
+    ``events`` worth recording; whoever reads them takes them away.
     """
 
     name: str
@@ -129,18 +132,13 @@ class Robot:
     done: int = 0
     words: int = 0
     _is_turning: bool = False
-    _messages: list[Notice] = field(default_factory=list)
-    _events: list[Event] = field(default_factory=list)
+    messages: list[Notice] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
     #: The event that it has chosen and not started, where there are no steps.
     _chosen: str | None = None
     #: Beginnings missed, the step in which it was stopped.
     _missed: int = 0
     _stopped_in: int = -1
-
-    @property
-    def _is_common(self) -> bool:
-        """Whether all robots turn in the same time before they drive, and idle without time."""
-        return self.way in ("clock", "barrier")
 
     def subplan(self) -> list[str | None]:
         """What it chose, and would choose in the steps that it has not begun."""
@@ -171,7 +169,7 @@ class Robot:
                 return STANDING
         step = self.steps[-1]
         if step.place is None:
-            has_ended = self._is_common or time >= step.begin + self.period
+            has_ended = self.way in _COMMON or time >= step.begin + self.period
         else:
             has_ended = math.dist(pose[:2], self.points[step.place]) < _ARRIVED
         if has_ended:
@@ -195,7 +193,7 @@ class Robot:
         self._is_turning = place is not None
         missed = round(time / self.period) - self.done if self.way == "clock" else 0
         if missed > self._missed:
-            self._events.append(("missed", {}))
+            self.events.append(("missed", {}))
         self._missed = missed
         return True
 
@@ -207,19 +205,13 @@ class Robot:
         own = {"barrier": self.done, "word": self.words}.get(self.way, 0)
         return all(heard >= own for heard in self.heard.values())
 
-    def told(self) -> tuple[list[Notice], list[Event]]:
-        """What it has told all robots since this was asked last, and what is worth recording."""
-        told = self._messages, self._events
-        self._messages, self._events = [], []
-        return told
-
     def _heed_wishes(self) -> None:
         """Commit to what is wanted from now on, where its choices allow it."""
         for atom in () if self.monitor.finished else self.wishes.pop(self.done, ()):
             granted = bool(self.monitor.can(visit=atom))
             if granted:
                 self.monitor.commit(visit=atom)
-            self._events.append(("detour", {"visit": atom, "granted": granted}))
+            self.events.append(("detour", {"visit": atom, "granted": granted}))
 
     @property
     def _is_underway(self) -> bool:
@@ -236,7 +228,7 @@ class Robot:
             else:
                 monitor.ready(name, notice.subaction)
         except NotPossible:  # they have agreed on nothing
-            self._events.append(("contradicted", {}))
+            self.events.append(("contradicted", {}))
 
     def _started(self, monitor: EventMonitor) -> str | None:
         """The event that starts now, of those that are free; None: there is none, or it waits."""
@@ -253,7 +245,7 @@ class Robot:
         return event
 
     def _tell(self, kind: Kind, number: int, subaction: str = "") -> None:
-        self._messages.append(Notice(self.name, kind, number, subaction))
+        self.messages.append(Notice(self.name, kind, number, subaction))
 
     def _finish(self, step: OwnStep, time: float) -> None:
         before, words = self.words, None
@@ -270,7 +262,7 @@ class Robot:
             self._tell("step", self.done)
         elif self.way == "word" and self.words > before:
             self._tell("word", self.words)
-            self._events.append(("word", {}))
+            self.events.append(("word", {}))
 
     def _driven(
         self, target: tuple[float, float], since: float, pose: Pose, look: Look | None
@@ -283,7 +275,7 @@ class Robot:
         angle = math.remainder(math.atan2(target[1] - y, target[0] - x) - heading, 2 * math.pi)
         turn = max(-TURN, min(TURN, _GAIN * angle))
         if self._is_turning:
-            waits = self._is_common and since < _TURNING
+            waits = self.way in _COMMON and since < _TURNING
             if waits or abs(angle) >= _ALIGNED:
                 return 0.0, turn
             self._is_turning = False
@@ -292,6 +284,6 @@ class Robot:
         room = ((look() if look else math.inf) - (self.radius + 0.03)) / _REACTION
         if room <= 0 and self._stopped_in != self.done:
             self._stopped_in = self.done
-            self._events.append(("stopped", {}))
+            self.events.append(("stopped", {}))
         ahead = _GAIN * math.dist((x, y), target) * max(0.0, math.cos(angle))
         return max(0.0, min(ahead, SPEED, room)), turn

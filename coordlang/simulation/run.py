@@ -149,11 +149,11 @@ class _Going:
         for name, robot in self.robots.items():
             look = partial(self.simulator.ahead, name) if self.settings.lidar else None
             velocities[name] = robot.act(self.time, self._believed(name), look, heard)
-            messages, events = robot.told()
-            self.heard += (*messages,)
-            self.messages += len(messages)
-            for kind, further in events:
+            self.heard += (*robot.messages,)
+            self.messages += len(robot.messages)
+            for kind, further in robot.events:
                 self._event(kind, [name], **further)
+            robot.messages, robot.events = [], []
         self.simulator.tick(velocities)
         self.ticks += 1
         self._see_collisions()
