@@ -654,7 +654,7 @@ def _read_states(entry: Mapping[str, Any], written: dict[str, str]) -> list[_Sta
     reached, last = {0}, max(record["step"] for record in records)
     for number in reversed(range(len(records))):
         record, step = records[number], records[number]["step"]
-        moves = _moves(record["next"], number, step + 1, states, written)
+        moves = _moves(record, number, step + 1, states, written)
         reached.update(moves.values())
         if bool(moves) != (step < last):
             raise MonitorError(f"state {number} ends after {step} of {last} steps")
@@ -672,15 +672,11 @@ def _read_states(entry: Mapping[str, Any], written: dict[str, str]) -> list[_Sta
 
 
 def _moves(
-    following: Mapping[str, Any],
-    number: int,
-    step: int,
-    states: Mapping[int, _State],
-    written: dict[str, str],
+    record: Any, number: int, step: int, states: Mapping[int, _State], written: dict[str, str]
 ) -> dict[str | None, int]:
     """What the robot may do in a state, idling first."""
     moves: dict[str | None, int] = {}
-    for text, to in following.items():
+    for text, to in record["next"].items():
         if text not in written:
             _check_plain(text, f"state {number}: 'next'")
             written[text] = text
