@@ -17,7 +17,7 @@ from planners.system.files import FileFormat, doc, read_bytes
 FORMAT = "coordlang/simulation"
 VERSION = 1
 
-#: Places, walls and poses lie within so many metres.
+#: Places, walls and poses lie within so many metres, and nothing is larger.
 _LARGEST = 1e6
 
 _Seconds = Annotated[float, doc("Seconds since the start of the run.", ge=0)]
@@ -216,7 +216,10 @@ def _wrong(record: SimulationRecord, run: RunRecord) -> str | None:
     named = {step.robot for step in run.steps}.union(*(event.robots for event in run.events))
     if not named <= {*record.robots}:
         return "it speaks of robots that are not listed"
-    poses = chain(*run.poses.values())
-    if not all(abs(x) < _LARGEST and abs(y) < _LARGEST for x, y, _ in poses):  # nor NaN
-        return f"poses lie between {-_LARGEST:g} and {_LARGEST:g}"
+    if not record.places:
+        return "there is no place in it"
+    sizes = record.radius, record.cell
+    drawn = chain([sizes], record.places.values(), record.walls, *run.poses.values())
+    if not all(abs(number) < _LARGEST for number in chain(*drawn)):  # nor NaN
+        return f"sizes, places, walls and poses lie between {-_LARGEST:g} and {_LARGEST:g}"
     return None

@@ -104,15 +104,15 @@ class Scene:
         figure = self.axes.get_figure(root=True)
         assert figure is not None, "axes are made in a figure"
         inches = self.axes.get_position().height * figure.get_figheight()
-        points = max(2.0, 0.8 * 72 * inches / (high[1] - low[1]) * radius)
+        points = min(100.0, max(2.0, 0.8 * 72 * inches / (high[1] - low[1]) * radius))
         look = {"color": "white", "ha": "center", "va": "center", "zorder": 7}
         return disc, self.axes.text(0, 0, name, fontsize=points, **look), front, way
 
 
 def frames(record: SimulationRecord, run: RunRecord) -> Iterator[Image]:
     """Draw a run as images of one size, four times as fast as it was; the last one stands."""
-    every = max(1, round(_SECONDS / record.interval))
     last = len(run.poses[record.robots[0]]) - 1
+    every = max(1, round(min(last, _SECONDS / record.interval)))
     width, height = _size(record, _FLOOR)
     width, height = _even(max(width, _LEAST)), _even(height + 2 * _TEXT)
     figure = new_figure(width, height, _DPI)

@@ -291,6 +291,7 @@ def test_films_have_the_frames_that_are_drawn() -> None:
     poses = {name: own[:5] for name, own in run.poses.items()}
     run = msgspec.structs.replace(run, poses=poses)
     drawn = list(frames(found, run))
+    assert [*frames(msgspec.structs.replace(found, interval=1e-320), run)]
     assert len({image.shape for image in drawn}) == 1
     pictures = {kind: RECORDINGS[kind](found, run) for kind in (".gif", ".mp4", ".png")}
     gif, film, sheet = (imageio.v3.imread(data, extension=kind) for kind, data in pictures.items())
@@ -311,6 +312,7 @@ def test_a_record_that_cannot_be_played_is_refused(tmp_path: Path) -> None:
     for change, said in (
         (poses.pop, "seed 1: there is not one pose of each robot"),
         (lambda: poses.append([1e9, 0, 0]), "poses lie between"),
+        (data["places"].clear, "there is no place in it"),
         (lambda: data.update(robots=["r1"]), "robots that are not listed"),
     ):
         change()
