@@ -123,13 +123,11 @@ def _to_repair(
 
 def _arguments(options: BuildOptions) -> list[str]:
     """Return the keywords of a call as a language file records them (a command: as it is typed)."""
-    named = {**asdict(options.way), "words": options.words, "worst": options.worst}
-    if options.way.effort == EFFORT:
-        del named["effort"]
-    given = {name: value for name, value in named.items() if value}
     files = {"tasks": options.tasks, "start": options.start}
-    given |= {k: fspath(file) for k, file in files.items() if isinstance(file, str | PathLike)}
-    return [f"{name}={value}" for name, value in sorted(given.items())]
+    named = {**asdict(options.way), "words": options.words, "worst": options.worst}
+    named["effort"] = options.way.effort != EFFORT and options.way.effort
+    named |= {k: fspath(file) for k, file in files.items() if isinstance(file, str | PathLike)}
+    return [f"{name}={value}" for name, value in sorted(named.items()) if value]
 
 
 def show_build(built: Built, options: BuildOptions) -> int:

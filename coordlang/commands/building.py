@@ -6,13 +6,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from itertools import count
 from math import inf
 from time import perf_counter
 from typing import Any
+
+import msgspec
 
 from coordlang.commands.records import BuildPreference, MethodOptions
 from coordlang.commands.witness import witness_data, witness_text
@@ -188,7 +190,7 @@ def repair_language(making: Making, start: Language, seed: int) -> Built:
     verdict = verify_candidates(partition, making.candidates, making.workers, making.progress)
     making.note("verify")
     gone = len(start.states) - len(known.states)
-    repaired = Repaired(verdict.witness, new_states=len(keys) - len(words), gone=gone)
+    repaired = Repaired(verdict.witness, new_states=len(keys) - len(words), states_gone=gone)
     if verdict.holds:
         making.verified.append((words, partition, verdict))
         # What the old file claims of fewer words is not believed: the bound is the job's.
@@ -201,9 +203,9 @@ def repair_language(making: Making, start: Language, seed: int) -> Built:
     repaired = replace(
         repaired,
         changed=tuple(ChangedState(key, known.states[key], now.states[key]) for key in changed),
-        changes_bound=result.changes_bound,
+        changed_lower_bound=result.changes_bound,
         new_words=tuple(word for word in now.words if word not in number),
-        new_words_bound=result.new_words_bound,
+        new_words_lower_bound=result.new_words_bound,
     )
     return making.built(job, result, REPAIR, repaired=repaired)
 
@@ -292,11 +294,11 @@ class Making:
 
         Words that were not verified are none.
         """
-        known = [own for own in self.verified if own[0] is found.partition]
-        if not known:
-            none = Verdict(False, self.candidates.count, 0, None)
-            known = [(found.partition, self.partition_of(found.partition), none)]
-        _, partition, verdict = known[0]
+        known = [
+            (own, verdict) for words, own, verdict in self.verified if words is found.partition
+        ]
+        none = Verdict(False, self.candidates.count, 0, None)
+        partition, verdict = known[0] if known else (self.partition_of(found.partition), none)
         guarantee = Guarantee.of(method, len(partition.words), found.lower_bound, verdict.holds)
         provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
         if not verdict.holds:
@@ -485,18 +487,18 @@ class Repaired:
 
     ``witness`` has plans of one sentence of the old language that miscoordinate; None: it still
     holds, and no word was changed.  Other words have the states ``changed``; every language for the
-    tasks changes ``changes_bound`` states at least, and one that changes so few has at least
-    ``new_words_bound`` of ``new_words``.  ``new_states`` on plans of the tasks are not listed in
-    the old language, and ``gone`` of its states the problem cannot have any more.
+    tasks changes ``changed_lower_bound`` states at least, and one that changes so few has at least
+    ``new_words_lower_bound`` of ``new_words``.  ``new_states`` on plans of the tasks are not listed
+    in the old language, and ``states_gone`` of its states the problem cannot have any more.
     """
 
     witness: Miscoordination | None
     changed: tuple[ChangedState, ...] = ()
-    changes_bound: int = 0
+    changed_lower_bound: int = 0
     new_words: tuple[str, ...] = ()
-    new_words_bound: int = 0
+    new_words_lower_bound: int = 0
     new_states: int = 0
-    gone: int = 0
+    states_gone: int = 0
 
     @property
     def still_holds(self) -> bool:
@@ -505,21 +507,15 @@ class Repaired:
 
     def data(self) -> dict[str, Any]:
         """The same as JSON data."""
-        return {
-            "still_holds": self.still_holds,
-            "miscoordination": witness_data(self.witness),
-            "changed": [asdict(change) for change in self.changed],
-            "changed_lower_bound": self.changes_bound,
-            "new_words": list(self.new_words),
-            "new_words_lower_bound": self.new_words_bound,
-            "new_states": self.new_states,
-            "states_gone": self.gone,
-        }
+        data = {"still_holds": self.still_holds, "miscoordination": witness_data(self.witness)}
+        data |= msgspec.to_builtins(self)
+        del data["witness"]
+        return data
 
     def text(self) -> str:
         """Why the language was changed, and which states have other words."""
-        gone = f"{counted(self.gone, 'state')} of the old language: not on this map"
-        lines = [gone] if self.gone else []
+        gone = f"{counted(self.states_gone, 'state')} of the old language: not on this map"
+        lines = [gone] if self.states_gone else []
         if self.witness is None:
             return "\n".join(["the old language still holds: no word is changed", *lines])
         sentence, number, new = " ".join(self.witness.sentence or ()), len(self.changed), ""
@@ -528,11 +524,11 @@ class Repaired:
             new = f"; {counted(self.new_states, 'new state')}"
         if words := self.new_words:
             new += f"; {counted(len(words), 'new word')} ({', '.join(words)})"
-            new += _proof(len(words), self.new_words_bound)
+            new += _proof(len(words), self.new_words_lower_bound)
         lines += [
             f'the old language fails: plans with the sentence "{sentence}" do not mix',
             witness_text(self.witness),
-            f"{counted(number, 'state')} {verb}{_proof(number, self.changes_bound)}{new}",
+            f"{counted(number, 'state')} {verb}{_proof(number, self.changed_lower_bound)}{new}",
             *(f"  {c.state or NO_FACT}: {c.old} -> {c.new}" for c in self.changed[:_SHOWN]),
         ]
         if number > _SHOWN:

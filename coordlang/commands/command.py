@@ -176,7 +176,7 @@ def _files(
     These no output may overwrite: arguments, what is read beside them, those of options.
     """
     outputs: list[OutputFile] = []
-    folders = {os.path.dirname(path) for path in arguments}
+    folders = {os.path.dirname(path) for path in arguments if hasattr(options, "source")}
     read = [*arguments, *(os.path.join(each, "coordinates.json") for each in sorted(folders))]
     makes_folder = getattr(options, "writes_folder", True)
     for each, value in given:

@@ -101,11 +101,6 @@ class Arguments:
         return domain if isinstance(domain, PlanningInstance) else None
 
     @property
-    def domain(self) -> Domain | given.File | None:
-        """The domain that is given, or that of `load`."""
-        return self.loaded.domain if self.loaded else self.values.get("DOMAIN")
-
-    @property
     def problems(self) -> list[given.ProblemSource]:
         """The problems that are given, else those of `load`."""
         found = [*self.values.get("PROBLEMS...", ()), self.values.get("PROBLEM")]
@@ -125,10 +120,10 @@ class Arguments:
 
         Raises `UsageError` for too few or too many of them.
         """
-        domain, problems = self.domain, self.problems
         if self.source.factored is not None:
             return self._read_factored(self.source.factored)
-        is_single = "PROBLEMS..." not in self.values
+        domain = self.loaded.domain if self.loaded else self.values.get("DOMAIN")
+        problems, is_single = self.problems, "PROBLEMS..." not in self.values
         if domain is None or not problems or (is_single and len(problems) > 1):
             wanted = "one problem" if is_single else "problems"
             raise UsageError(
@@ -140,7 +135,7 @@ class Arguments:
         return PlanningInput(lifted, found, self._source())
 
     def _read_factored(self, folder: given.File) -> PlanningInput:
-        if self.domain is not None or self.problems:
+        if self.problems or self.values.get("DOMAIN") is not None:
             raise UsageError("--factored names all files", remedy="Leave out domain and problem.")
         from planners.pddl.factored import read_factored
 
@@ -300,16 +295,8 @@ def language_for(
     from coordlang.commands.lift import ground_in
     from planners.parallel.workers import Workers
 
-    found, _ = ground_in(
-        read,
-        files,
-        position,
-        tasks=tasks,
-        is_verified=is_verified,
-        points=coordinates_of(coordinates, files.problems[0]),
-        workers=Workers(),
-        every_word=is_verified,
-    )
+    given = files, position, tasks, coordinates, Workers()
+    found, _ = ground_in(read, *given, is_verified=is_verified, every_word=is_verified)
     return found, position
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from os import fspath
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import coordlang
 from coordlang.commands.inputs import Arguments, PlanningInput, coordinates_of, public
 from coordlang.commands.records import (
+    CoordinatesSource,
     File,
     GroundOptions,
     Jobs,
@@ -29,7 +29,6 @@ from coordlang.lifted import language as lifted_file
 from coordlang.lifted.features import english, formula
 from coordlang.lifted.language import Known, LiftedLanguage, Verified, grounded
 from coordlang.lifted.learning import Instance, Learned, learn
-from coordlang.sites.coordinates import Point
 from coordlang.verification.by_definition import verify_candidates
 from planners.parallel.workers import Workers
 from planners.system.errors import (
@@ -193,11 +192,11 @@ def ground_in(
     lifted: LiftedLanguage,
     files: PlanningInput,
     position: Position,
-    *,
     tasks: TasksSource | None,
-    is_verified: bool,
-    points: Mapping[str, Point],
+    coordinates: CoordinatesSource | None,
     workers: Workers,
+    *,
+    is_verified: bool,
     every_word: bool = False,
 ) -> tuple[Language, Known]:
     """The words of a problem's states, verified there unless that is not wanted or does not fit.
@@ -205,6 +204,7 @@ def ground_in(
     With ``every_word`` the language has the words that no state here has, too.  Raises `BadInput`
     if the lifted language belongs to another domain or other robots.
     """
+    points = coordinates_of(coordinates, files.problems[0])
     shape = lifted_file.described(lifted)
     check_domain(shape, files.domain, position)
     say(f"finding all optimal plans of {files.problems[0].name}")
@@ -237,15 +237,9 @@ def ground(arguments: Arguments, options: GroundOptions) -> Language:
         own, position = lifted_file.read_lifted(fspath(lifted)), Position(fspath(lifted))
     files = arguments.read()
     with Jobs(options.jobs).opened() as workers:
-        language, known = ground_in(
-            own,
-            files,
-            position,
-            tasks=None if options.tasks == "own" else options.tasks,
-            is_verified=options.verified,
-            points=coordinates_of(options.coordinates, files.problems[0]),
-            workers=workers,
-        )
+        tasks = None if options.tasks == "own" else options.tasks
+        given = files, position, tasks, options.coordinates, workers
+        language, known = ground_in(own, *given, is_verified=options.verified)
     if known == "refuted":
         learned_from = ", ".join(f"{v.problem} ({_TASKS[v.kind]})" for v in own.verified)
         asked = {"all": "all", "own": "problems"}.get(str(options.tasks), "file")

@@ -123,10 +123,10 @@ class CommandOptions:
     no_cache: bool = cli_option(False, "Search anew: read no plans that were found before.")
     limits: Limits = group(Limits)
 
-    def __init_subclass__(cls, **said: str | bool) -> None:
+    def __init_subclass__(cls) -> None:
         own = cls.__name__.removesuffix("Options").lower()
-        for key, value in {"name": own, "module": own, "function": own, **said}.items():
-            setattr(cls, key, value)
+        for key in {"name", "module", "function"} - vars(cls).keys():
+            setattr(cls, key, own)
         dataclass(frozen=True, eq=False, repr=False)(cls)
 
 
@@ -160,9 +160,10 @@ class Source:
     given: frozenset[str] = frozenset()
 
 
-class PlanningOptions(CommandOptions, takes="DOMAIN PROBLEMS..."):
+class PlanningOptions(CommandOptions):
     """What a command can be asked for that reads a domain and problems; and `coordlang.load`."""
 
+    takes = "DOMAIN PROBLEMS..."
     # Plans are optimal and in step, or a language file says what they are.
     source: Source = group(Source, without="slack words_see_slack asynchronous")
 
@@ -244,83 +245,75 @@ class MethodOptions:
     )
 
 
-class InspectOptions(
-    AnswerOptions,
-    takes="DOMAIN PROBLEM",
-    doing="reading and grounding",
-    keeps_plans=False,
-    used="states write as_json",
-):
+class InspectOptions(AnswerOptions):
     """Show what was understood of a domain: robots, subactions, constraints."""
 
+    takes = "DOMAIN PROBLEM"
+    doing = "reading and grounding"
+    keeps_plans = False
+    used = "states write as_json"
     states: bool = option(False, "Also count the reachable joint states and steps.")
     write: File | None = option(
         None, "Also write what was read here, as PDDL.", "DIR", is_output=True, files=WRITTEN
     )
 
 
-class PlansOptions(
-    AnswerOptions,
-    takes="DOMAIN PROBLEM",
-    used="only_count most sample",
-    example="{MAP} --count",
-):
+class PlansOptions(AnswerOptions):
     """Count, list or sample all optimal plans of a task.
 
     With --slack B those that take at most B steps more, too.
     """
 
+    takes = "DOMAIN PROBLEM"
+    used = "only_count most sample"
+    example = "{MAP} --count"
     form: Literal["ipc", "json"] = cli_option("ipc", "How plans are written.", names="--format")
     listing: Listing = group(Listing)
     source: Source = group(Source, without="words_see_slack")
 
 
-class CheckOptions(
-    AnswerOptions,
-    takes="DOMAIN PROBLEM",
-    doing="solving the task twice",
-    keeps_plans=False,
-    used="as_json",
-):
+class CheckOptions(AnswerOptions):
     """Compare our optimal cost with Fast Downward's.
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
     """
 
+    takes = "DOMAIN PROBLEM"
+    doing = "solving the task twice"
+    keeps_plans = False
+    used = "as_json"
 
-class CoordinationOptions(AnswerOptions, used="asynchronous jobs as_json"):
+
+class CoordinationOptions(AnswerOptions):
     """Decide which tasks require coordination, with a miscoordination shown."""
 
+    used = "asynchronous jobs as_json"
     work: Jobs = group(Jobs)
     source: Source = group(Source, without="words_see_slack")
 
 
-class TasksOptions(
-    AnswerOptions,
-    takes="DOMAIN PROBLEM",
-    module="domains",
-    doing="reading and grounding",
-    keeps_plans=False,
-    used="start goal output",
-    example='{MAP} --start "(at r1 ?)" -o tasks.json',
-):
+class TasksOptions(AnswerOptions):
     """Write a task file: PROBLEM with other starts and goals; ? in a PATTERN is any name."""
 
+    takes = "DOMAIN PROBLEM"
+    module = "domains"
+    doing = "reading and grounding"
+    keeps_plans = False
+    used = "start goal output"
+    example = '{MAP} --start "(at r1 ?)" -o tasks.json'
     start: tuple[str, ...] = option((), "Atoms of which starts have others.", "PATTERN")
     goal: tuple[str, ...] = option((), "Each goal has one atom like this.", "PATTERN")
     output: str = result_option("The task file")
 
 
-class BuildOptions(
-    AnswerOptions,
-    used="tasks method output",
-    example="{MAP} --tasks all --method minimal -o t-map.json",
-):
+class BuildOptions(AnswerOptions):
     """Build a coordination language and verify it.
 
     Exit 0: written, with the proof that the method promises.  3: without it (a limit was hit).
     """
 
+    used = "tasks method output"
+    example = "{MAP} --tasks all --method minimal -o t-map.json"
     tasks: TasksSource | None = option(
         None, "Tasks: every pair of reachable states, or a task file.", "all|FILE"
     )
@@ -348,18 +341,16 @@ class BuildOptions(
     source: Source = group(Source)
 
 
-class VerifyOptions(
-    AnswerOptions,
-    takes="LANGUAGE DOMAIN PROBLEMS...",
-    doing="verifying by definition",
-    used="tasks certificate as_json",
-    example="t-map.json {MAP}",
-):
+class VerifyOptions(AnswerOptions):
     """Check by definition that LANGUAGE is a coordination language.
 
     Exit 0: it is, or robots fail as rarely as its file claims.  1: neither.
     """
 
+    takes = "LANGUAGE DOMAIN PROBLEMS..."
+    doing = "verifying by definition"
+    used = "tasks certificate as_json"
+    example = "t-map.json {MAP}"
     tasks: TasksSource | None = option(
         None, "Check these tasks, not those that the file records.", "all|FILE"
     )
@@ -376,16 +367,14 @@ class VerifyOptions(
     work: Jobs = group(Jobs)
 
 
-class LiftOptions(
-    AnswerOptions,
-    used="tasks check output",
-    example="{GRID} --tasks all -o lifted.json",
-):
+class LiftOptions(AnswerOptions):
     """Learn words as functions of features of states, for all PROBLEMS at once.
 
     Exit 0: written.  3: written, but a limit ended the search.  11: no features suffice.
     """
 
+    used = "tasks check output"
+    example = "{GRID} --tasks all -o lifted.json"
     source: Source = group(Source, without="slack words_see_slack")
     tasks: Literal["all"] | None = option(None, "Tasks: every pair of reachable states.")
     check: Sequence[ProblemSource] = option(
@@ -401,19 +390,17 @@ class LiftOptions(
     seed: int = option(0, "Seed of all random choices.", least=0)
 
 
-class GroundOptions(
-    PlanningOptions,
-    takes="LIFTED DOMAIN PROBLEM",
-    module="lift",
-    used="tasks verified output",
-    example="lifted.json {GRID} -o 2x2.json",
-):
+class GroundOptions(PlanningOptions):
     """Write the language file of one problem from a lifted language.
 
     Exit 0: written, and verified unless --unverified.  1: refuted, and nothing is written.  3:
     written, but the memory did not suffice to verify it.
     """
 
+    takes = "LIFTED DOMAIN PROBLEM"
+    module = "lift"
+    used = "tasks verified output"
+    example = "lifted.json {GRID} -o 2x2.json"
     tasks: TasksSource | None = option(
         "all", "Tasks: every pair of reachable states, a file's, the problem's.", "all|FILE|own"
     )
@@ -423,41 +410,36 @@ class GroundOptions(
     output: str = result_option("The language file (.json, .json.gz)", "LANGUAGE")
 
 
-class SayOptions(
-    AnswerOptions,
-    takes="LANGUAGE DOMAIN PROBLEM PLAN",
-    module="sentences",
-    used="as_json",
-    example="t-map.json {MAP} plan.txt",
-):
+class SayOptions(AnswerOptions):
     """Print the sentence of an optimal plan, or of each plan of a file, one a line."""
 
+    takes = "LANGUAGE DOMAIN PROBLEM PLAN"
+    module = "sentences"
+    used = "as_json"
+    example = "t-map.json {MAP} plan.txt"
 
-class UnderstandOptions(
-    AnswerOptions,
-    takes="LANGUAGE DOMAIN PROBLEM SENTENCE",
-    module="sentences",
-    doing="finding the plans with the sentence",
-    used="only_count most output",
-    example='t-map.json {MAP} "w0 w2 w1 w0" -o plan.txt',
-):
+
+class UnderstandOptions(AnswerOptions):
     """Count, list or sample the optimal plans that a SENTENCE ("w1 w0") leaves open."""
 
+    takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
+    module = "sentences"
+    doing = "finding the plans with the sentence"
+    used = "only_count most output"
+    example = 't-map.json {MAP} "w0 w2 w1 w0" -o plan.txt'
     listing: Listing = group(Listing)
     form: Literal["ipc", "json"] = cli_option("ipc", "json: with their graph.", names="--format")
     output: str | None = output_option("Write to this file instead of stdout.")
 
 
-class PlanOptions(
-    AnswerOptions,
-    takes="LANGUAGE DOMAIN PROBLEM [SENTENCE]",
-    module="sentences",
-    doing="searching for a plan",
-    used="prefer form as_json",
-    example="t-map.json {MAP} --prefer first:r2",
-):
+class PlanOptions(AnswerOptions):
     """Find one optimal plan under SENTENCE ("w1 w0"), or under the best sentence (--prefer)."""
 
+    takes = "LANGUAGE DOMAIN PROBLEM [SENTENCE]"
+    module = "sentences"
+    doing = "searching for a plan"
+    used = "prefer form as_json"
+    example = "t-map.json {MAP} --prefer first:r2"
     prefer: str | Sequence[str] = option(
         (), 'shortest, most-plans, first:ROBOT or avoid:"(ATOM)".', "PREFERENCE"
     )
@@ -466,36 +448,32 @@ class PlanOptions(
     )
 
 
-class ChoicesOptions(
-    AnswerOptions,
-    takes="LANGUAGE DOMAIN PROBLEM SENTENCE",
-    doing="finding the robots' choices",
-    used="robot form output",
-    example='t-map.json {MAP} "w0 w2 w1 w0" --robot r1',
-):
+class ChoicesOptions(AnswerOptions):
     """Show what each robot may do under SENTENCE ("w1 w0"), whatever the others choose.
 
     A robot asks its monitor what it may do next, and which detours are left (docs/use.md).
     """
 
+    takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
+    doing = "finding the robots' choices"
+    used = "robot form output"
+    example = 't-map.json {MAP} "w0 w2 w1 w0" --robot r1'
     robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
     form: Literal["text", "json"] = cli_option("text", "How they are shown.", names="--format")
     output: str | None = output_option("Write to this file instead of stdout.")
 
 
-class RobotOptions(
-    PlanningOptions,
-    takes="LANGUAGE DOMAIN PROBLEM [SENTENCE]",
-    doing="finding the robot's choices",
-    used="robot prefer play",
-    example="events.json {MAP} --robot r1 --play 1",
-):
+class RobotOptions(PlanningOptions):
     """Execute one robot's part under SENTENCE ("w1 w0"), or one that robots agree on.
 
     The words are asynchronous.  JSON lines on stdout say what to start, those on stdin what is
     done (docs/robots.md).  Exit 0: its part is done.
     """
 
+    takes = "LANGUAGE DOMAIN PROBLEM [SENTENCE]"
+    doing = "finding the robot's choices"
+    used = "robot prefer play"
+    example = "events.json {MAP} --robot r1 --play 1"
     robot: str = option("", "Who this is.", "R", required=True)
     bus: str = option("unix", "How robots hear each other.", "unix[:FOLDER]|zenoh[:CONFIG]")
     prefer: str | Sequence[str] = option(
@@ -513,16 +491,14 @@ class RobotOptions(
             )
 
 
-class SimulateOptions(
-    AnswerOptions,
-    takes="LANGUAGE DOMAIN PROBLEM",
-    doing="simulating",
-    alone="replay",
-    used="sentence step output",
-    example="t-map.json {MAP} --runs 3",
-):
+class SimulateOptions(AnswerOptions):
     """Let robots with wheels do a task in a simulator (`pip install 'coordlang[sim]'`)."""
 
+    takes = "LANGUAGE DOMAIN PROBLEM"
+    doing = "simulating"
+    alone = "replay"
+    used = "sentence step output"
+    example = "t-map.json {MAP} --runs 3"
     sentence: SentenceSource | None = option(
         None, "What robots have agreed on.", "SENTENCE", without="without plan"
     )
@@ -550,18 +526,16 @@ class SimulateOptions(
             kind_of(path)
 
 
-class ExportOptions(
-    AnswerOptions,
-    takes="LANGUAGE DOMAIN PROBLEM SENTENCE",
-    doing="compiling the task",
-    used="to for_planner output",
-    example='t-map.json {MAP} "w0 w2 w1 w0" --to bt',
-):
+class ExportOptions(AnswerOptions):
     """Write a task under SENTENCE ("w1 w0") as PDDL, LTLf or behaviour trees.
 
     Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
     """
 
+    takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
+    doing = "compiling the task"
+    used = "to for_planner output"
+    example = 't-map.json {MAP} "w0 w2 w1 w0" --to bt'
     to: Literal["pddl", "ltlf", "bt"] = option(
         "pddl", "A problem, a temporal formula, or behaviour trees."
     )
@@ -580,61 +554,53 @@ class ExportOptions(
         return self.to == "pddl" and not is_text
 
 
-class ExplainOptions(
-    AnswerOptions,
-    takes="LANGUAGE DOMAIN PROBLEM",
-    doing="finding formulas of the words",
-    used="task sentence as_json",
-    example="t-map.json {MAP} --task",
-):
+class ExplainOptions(AnswerOptions):
     """Show a language: words as formulas, sentences of a task."""
 
+    takes = "LANGUAGE DOMAIN PROBLEM"
+    doing = "finding formulas of the words"
+    used = "task sentence as_json"
+    example = "t-map.json {MAP} --task"
     task: bool = option(False, "What each sentence of PROBLEM's task asks of each robot.")
     sentence: SentenceSource | None = option(
         None, "With --task: this sentence only.", "WORDS", needs="task"
     )
 
 
-class ReportOptions(
-    PlanningOptions,
-    takes="LANGUAGE DOMAIN PROBLEMS...",
-    doing="drawing the page",
-    used="output coordinates seed",
-    example="t-map.json {MAP} -o t-map.html",
-):
+class ReportOptions(PlanningOptions):
     """Write a page that shows a language: words, sentences, plans played."""
 
+    takes = "LANGUAGE DOMAIN PROBLEMS..."
+    doing = "drawing the page"
+    used = "output coordinates seed"
+    example = "t-map.json {MAP} -o t-map.html"
     output: str = result_option("The HTML file", "PAGE")
     coordinates: str | None = coordinates_option()
     seed: int = option(0, "Draws the tasks.")
 
 
-class DomainsOptions(
-    JsonOptions,
-    doing="copying",
-    keeps_plans=False,
-    used="copy as_json",
-    example="--copy all domains",
-):
+class DomainsOptions(JsonOptions):
     """List or copy the domains that come with coordlang."""
 
+    doing = "copying"
+    keeps_plans = False
+    used = "copy as_json"
+    example = "--copy all domains"
     copy: tuple[str, str] | None = option(
         None, "Copy this domain, or all, into DIR/NAME.", "NAME|all DIR"
     )
 
 
-class ImportOptions(
-    JsonOptions,
-    takes="FILES...",
-    module="domains",
-    function="import_site",
-    doing="reading",
-    keeps_plans=False,
-    used="robots task output",
-    example="{SITE} --robots 2 -o mine",
-):
+class ImportOptions(JsonOptions):
     """Write FILE.map with FILE.scen, or FILE.building.yaml of Open-RMF, as PDDL."""
 
+    takes = "FILES..."
+    module = "domains"
+    function = "import_site"
+    doing = "reading"
+    keeps_plans = False
+    used = "robots task output"
+    example = "{SITE} --robots 2 -o mine"
     robots: int | str | Sequence[str] | None = option(
         None, "How many, or their names (default: those that spawn in a building).", "N|NAMES"
     )

@@ -119,43 +119,40 @@ def word_rows(used: TaskLanguage, lifted: LiftedWords | None) -> tuple[list[dict
     ``examples``), and ``rest`` says that the formula is "every other state".  ``lifted`` has the
     formulas of words that are functions of features.
     """
-    described, in_order = _terms_of_words(used, lifted)
-    language, sizes = used.language, used.language.sizes()
-    largest = max([1, *sizes.values()])
-    rows = []
-    for word, terms, is_rest in described:
-        states = (key for key, own in language.states.items() if own == word)
-        rows.append(
-            {
-                "name": word,
-                "number": language.words.index(word),
-                "size": sizes[word],
-                "share": round(100 * sizes[word] / largest, 1),
-                "default": word == language.default,
-                "rest": is_rest,
-                "terms": None if terms is None else list(terms[:_TERMS]),
-                "more_terms": max(0, len(terms or ()) - _TERMS),
-                "examples": [*islice(states, _EXAMPLES)] if terms is None else [],
-            }
-        )
+    language, in_order = used.language, False
+    terms: dict[str, Sequence[str] | None] = dict.fromkeys(language.words)
+    rest: set[str] = set()
+    if lifted:
+        terms = {word: lifted.terms.get(word, ()) for word in terms}
+    elif 0 < len(language.states) <= _STATES_EXPLAINED:
+        mapped = mapped_states(used.partition, used.model)
+        told = describe_words(mapped, all_covers(mapped))
+        in_order, rest = told.in_order, {word for word, cover in told.rules if cover is None}
+        terms = {word: [*map(term_text, own.terms if own else ())] for word, own in told.rules}
+    sizes = language.sizes()
+    rows = [_word_row(language, word, sizes, own, word in rest) for word, own in terms.items()]
     return rows, in_order
 
 
-def _terms_of_words(
-    used: TaskLanguage, lifted: LiftedWords | None
-) -> tuple[list[tuple[str, Sequence[str] | None, bool]], bool]:
-    """Words with terms (None: not sought), which is "every other state", and if in order."""
-    language = used.language
-    if lifted:
-        return [(word, lifted.terms.get(word, ()), False) for word in language.words], False
-    if not 0 < len(language.states) <= _STATES_EXPLAINED:
-        return [(word, None, False) for word in language.words], False
-    mapped = mapped_states(used.partition, used.model)
-    told = describe_words(mapped, all_covers(mapped))
-    rows: list[tuple[str, Sequence[str] | None, bool]] = []
-    for word, cover in told.rules:
-        rows.append((word, [*map(term_text, cover.terms if cover else ())], cover is None))
-    return rows, told.in_order
+def _word_row(
+    language: Language,
+    word: str,
+    sizes: Mapping[str, int],
+    terms: Sequence[str] | None,
+    is_rest: bool,
+) -> dict[str, Any]:
+    states = (key for key, own in language.states.items() if own == word)
+    return {
+        "name": word,
+        "number": language.words.index(word),
+        "size": sizes[word],
+        "share": round(100 * sizes[word] / max([1, *sizes.values()]), 1),
+        "default": word == language.default,
+        "rest": is_rest,
+        "terms": None if terms is None else list(terms[:_TERMS]),
+        "more_terms": max(0, len(terms or ()) - _TERMS),
+        "examples": [*islice(states, _EXAMPLES)] if terms is None else [],
+    }
 
 
 def _map(world: World, known: Mapping[str, Point]) -> dict[str, Any]:
