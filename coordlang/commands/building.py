@@ -302,8 +302,7 @@ class Making:
         guarantee = Guarantee.of(method, len(partition.words), found.lower_bound, verdict.holds)
         provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
         if not verdict.holds:
-            slack = provenance.tolerance.slack if provenance.tolerance else None
-            tolerance = replace(more["failures"].tolerance, slack=slack)
+            tolerance = replace(more["failures"].tolerance, slack=provenance.slack)
             provenance = replace(provenance, tolerance=tolerance)
         language = Language.of(partition, self.candidates.model, provenance)
         return Built(language, job, verdict, found, self.seconds, **more)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import fspath
 from typing import Any
 
@@ -16,7 +16,6 @@ from coordlang.commands.records import (
     GroundOptions,
     Jobs,
     LiftOptions,
-    ProblemSource,
     TasksSource,
 )
 from coordlang.commands.terminal import UNPROVED, echo, ended_early, say, write
@@ -111,12 +110,12 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
     The problems need not have the same objects, but the same robots.  Raises `ProvedImpossible` if
     no features up to this complexity suffice.
     """
-    check, is_factored = options.check, options.source.factored is not None
-    given: list[Any] = [None] if is_factored else [*files.problems, *check]
-    every = [_instance(files, problem, options) for problem in given]
-    known = len(every) - len(check)
-    if not known:
+    if not files.problems and options.source.factored is None:
         raise UsageError("there is no problem to learn from", remedy="Name one or more.")
+    given = {**files.values, "PROBLEMS...": (*files.problems, *options.check)}
+    read = replace(files, values=given).read()
+    every = [_instance(replace(read, problems=[own]), options) for own in read.problems]
+    known = len(every) - len(options.check)
     first = every[0].candidates
     robots = first.model.robots
     for own in every:
@@ -157,12 +156,8 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
     return Lifted(language, learned)
 
 
-def _instance(
-    arguments: Arguments, problem: ProblemSource | None, options: LiftOptions
-) -> Instance:
-    """A problem; that of a factored folder where none is given."""
-    given = {"DOMAIN": arguments.values.get("DOMAIN"), "PROBLEM": problem}
-    files = Arguments(options.source, given).read()
+def _instance(files: PlanningInput, options: LiftOptions) -> Instance:
+    """The only problem of some files, with its candidate tasks."""
     if files.source.model.slack:
         raise UsageError(
             "--slack: words over features are learned from optimal plans",

@@ -12,9 +12,7 @@ from typing import Any, ClassVar
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import DEFAULT_MAX, Listing, PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot, write
-from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
-from planners.search.plan_file import to_ipc, to_json, to_plansys2
 from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.messages import Presented, counted
 
@@ -84,14 +82,20 @@ class OptimalPlans(Presented):
 
     def ipc(self, plan: Sequence[Texts]) -> str:
         """Return a plan as an IPC plan file (docs/formats.md); `ValueError` if it is none here."""
+        from planners.search.plan_file import to_ipc
+
         return to_ipc(self._plans, self._known(plan))
 
     def plansys2(self, plan: Sequence[Texts]) -> str:
         """Return a plan as PlanSys2 reads it (docs/formats.md); raises as `ipc`."""
+        from planners.search.plan_file import to_plansys2
+
         return to_plansys2(self._plans, self._known(plan))
 
     def data(self, listed: Sequence[Sequence[Texts]]) -> dict[str, Any]:
         """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""
+        from planners.search.plan_file import to_json
+
         return to_json(self._plans, [self._known(plan) for plan in listed])
 
     def _texts(self, plan: Plan) -> PlanSteps:
@@ -118,7 +122,12 @@ def plans(files: Arguments, options: PlansOptions) -> OptimalPlans:
     the joint model uses up the memory.
     """
     loaded = files.instance()
-    return OptimalPlans(Plans.of(as_executed(search(loaded.model, loaded.tasks[0]))))
+    space = search(loaded.model, loaded.tasks[0])
+    if loaded.model.is_asynchronous:
+        from planners.search.asynchronous import as_executed
+
+        space = as_executed(space)
+    return OptimalPlans(Plans.of(space))
 
 
 def show_plans(found: OptimalPlans, options: PlansOptions) -> None:
