@@ -291,9 +291,7 @@ def make_report(
         "is_mapped": all(task.language.is_mapped for task in selection.tasks),
     }
     data = page_data(selection, seed, points)
-    heat = None
-    if data["places"]:
-        heat = heat_of(language, domain, problems, options, selection, position)
+    heat = heat_of(selection, domain, problems, options) if data["places"] else None
     while len(html := _render({**shown, **drawn_plan(data, heat)}, data)) > LARGEST:
         if len(selection.tasks) == 1:
             what = f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}"

@@ -15,7 +15,6 @@ from operator import itemgetter
 from typing import Any
 
 from coordlang.language.recorded import recorded_candidates
-from coordlang.language.words import Language
 from coordlang.report.task import Selection
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import TooManyDivergences, divergences, minimal
@@ -65,25 +64,21 @@ class Heat:
 
 
 def heat_of(
-    language: Language,
-    domain: Domain,
-    problems: Sequence[Problem],
-    options: ModelOptions,
-    selection: Selection,
-    position: Position,
+    selection: Selection, domain: Domain, problems: Sequence[Problem], options: ModelOptions
 ) -> Heat | None:
     """The heat of all pairs of states if these are few, else of the shown tasks.
 
     Tasks whose divergences are not defined (no language serves them) or not found count as not
     there; None if there are no others.
     """
-    first = selection.tasks[0].language
+    first, nowhere = selection.tasks[0].language, Position("")
+    language = first.language
     if first.model.hides_slack or language.may_fail:
         return None
     is_all = language.provenance.tasks.get("kind") == "all" and not first.model.is_asynchronous
     if is_all and len(language.states) ** 2 * len(first.model.robots) <= _MOST_PAIRS:
         with suppress(BadInput, ProvedImpossible):  # a language may be used on another map
-            candidates = recorded_candidates(language, domain, [*problems], options, position)
+            candidates = recorded_candidates(language, domain, [*problems], options, nowhere)
             found = differences(candidates, Workers(), most=_MIXTURES).divergences
             if found is not None:
                 known = _located(first.model, [(candidates.rows, found)])

@@ -12,7 +12,6 @@ import pytest
 from coordlang.report.plan import WIDTH, Heat, counted_heat, drawn_plan, floor_plan, heat_of
 from coordlang.report.task import select_tasks
 from planners.search.plan_space import PlanSpace
-from planners.system.errors import Position
 from tests.coordlang.report.conftest import make_language
 from tests.support import naive
 from tests.support.domains import all_tasks
@@ -81,9 +80,7 @@ def test_heat_is_that_of_the_definition(domain: str, problem: str) -> None:
     language, lifted, asked = make_language(domain, problem)
     candidates = all_tasks(domain, problem)
     selection = select_tasks(language, lifted, [asked], 3, 0)
-    found = heat_of(
-        language, lifted, [asked], candidates.loaded.options, selection, Position("the language")
-    )
+    found = heat_of(selection, lifted, [asked], candidates.loaded.options)
     assert found is not None
     assert found == by_definition(list(candidates.spaces))
     assert found.most > 0

@@ -121,7 +121,8 @@ def test_command(coordlang: Command, tmp_path: Path) -> None:
         "robots": ["r1", "r2"],
         "unused": {},
     }
-    assert coordlang(*arguments, "-o", tmp_path / "new" / "folder").code == 0  # the same again
+    for folder in (tmp_path / "new" / "folder", tmp_path, tmp_path):  # the same again
+        assert coordlang(*arguments, "-o", folder).code == 0
     (tmp_path / "new" / "folder" / "domain.pddl").write_text("mine")
     outcome = coordlang(*arguments, "-o", tmp_path / "new" / "folder")
     assert (outcome.code, "says something else" in outcome.err) == (2, True)
