@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from itertools import count
@@ -83,7 +83,7 @@ def build_language(
     even failures in silence can be counted.
     """
     options = options or record_from(MethodOptions, {"method": method, **way}, "build_language")
-    method, making = options.method, Making(candidates, workers, progress)
+    method, making = options.method, Making(candidates, workers or Workers(), progress)
     if words is not None:
         return _few_words(making, words, worst=worst, seed=options.seed)
     if start is not None:
@@ -232,6 +232,7 @@ def _with_words(old: Language, keys: Mapping[int, str], assignment: Assignment) 
     return replace(old, words=words, states=states, default=default)
 
 
+@dataclass(slots=True)
 class Making:
     """Candidate tasks on their way to a language: who works, the time by phase, what is verified.
 
@@ -240,20 +241,17 @@ class Making:
     Raises `ProvedImpossible` if there is no candidate task.
     """
 
-    def __init__(
-        self,
-        candidates: Candidates,
-        workers: Workers | None = None,
-        progress: Callable[[str], None] = lambda _: None,
-    ) -> None:
-        require_solvable(candidates)
-        self.candidates, self.workers, self.progress = candidates, workers or Workers(), progress
-        self.seconds: dict[str, float] = {}
-        self.partition_of: Callable[[Assignment], Partition] = partial(
-            Partition.of_states, candidates.rows
-        )
-        self.verified: list[tuple[Assignment, Partition, Verdict]] = []
-        self._since = perf_counter()
+    candidates: Candidates
+    workers: Workers = field(default_factory=Workers)
+    progress: Callable[[str], None] = lambda _: None
+    seconds: dict[str, float] = field(default_factory=dict)
+    verified: list[tuple[Assignment, Partition, Verdict]] = field(default_factory=list)
+    partition_of: Callable[[Assignment], Partition] = field(init=False)
+    _since: float = field(default_factory=perf_counter)
+
+    def __post_init__(self) -> None:
+        require_solvable(self.candidates)
+        self.partition_of = partial(Partition.of_states, self.candidates.rows)
 
     def note(self, phase: str) -> None:
         """Say that a phase has ended."""
@@ -294,9 +292,7 @@ class Making:
 
         Words that were not verified are none.
         """
-        known = [
-            (own, verdict) for words, own, verdict in self.verified if words is found.partition
-        ]
+        known = [own[1:] for own in self.verified if own[0] is found.partition]
         none = Verdict(False, self.candidates.count, 0, None)
         partition, verdict = known[0] if known else (self.partition_of(found.partition), none)
         guarantee = Guarantee.of(method, len(partition.words), found.lower_bound, verdict.holds)
