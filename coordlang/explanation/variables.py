@@ -16,8 +16,9 @@ from itertools import chain, combinations
 import numpy as np
 
 from planners.joint.model import JointModel, own_text
-from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
+from planners.joint.tables import Bools, Ints, Rows, unique_rows
 from planners.pddl.lifted import Atom
+from planners.search.reachable import Exploration, PieceSizes
 
 #: States and joint steps looked at to find out what holds in all reachable states.
 _STATES = 20_000
@@ -93,20 +94,16 @@ def truth(model: JointModel, rows: Rows) -> tuple[tuple[Atom, ...], Bools]:
 
 def _surroundings(model: JointModel, rows: Rows) -> Rows:
     """The states and what can be reached from them, as far as the limits go."""
-    seen = layer = unique_rows(rows)[0]
-    steps = 0
-    while len(layer) and len(seen) < _STATES and steps < _STEPS:
-        fresh = []
-        for start in range(0, len(layer), _AT_ONCE):
-            found = model.successors(layer[start : start + _AT_ONCE])
-            fresh.append(unique_rows(found.result)[0])
-            steps += len(found)
-            if steps >= _STEPS:
+    found = Exploration(model, unique_rows(rows)[0], PieceSizes(states=_AT_ONCE))
+    while len(found.layer) and len(found.table) < _STATES and found.composed < _STEPS:
+        before = len(found.table)
+        for _, steps in found.steps():
+            found.table.add(steps.result)
+            if found.composed >= _STEPS:
                 break
-        new, _ = unique_rows(np.concatenate(fresh))
-        layer = new[find_rows(seen, new) < 0]
-        seen, _ = unique_rows(np.concatenate((seen, layer)))
-    return seen
+        new = np.arange(before, len(found.table))
+        found.layers.append(new[np.lexsort(found.table.rows(new).T[::-1])])
+    return found.table.rows(np.arange(len(found.table)))
 
 
 def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: bool) -> Variable:
