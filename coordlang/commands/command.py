@@ -87,19 +87,15 @@ class Command(click.Command):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options under four titles."""
-        sections: dict[str, list[tuple[str, str]]]
-        sections = {"Most used": [], "Options": [], "Model": [], "Work and limits": []}
-        title_of = {"no_cache": "Work and limits"}
+        title_of = {"no_cache": "Work and limits", "arguments": "of the usage line"}
         kinds = {Source: "Model", Jobs: "Work and limits", Limits: "Work and limits"}
         for kind, title in kinds.items():
             title_of |= {each.name: title for each in options_of(kind)}
         title_of |= dict.fromkeys(self.record.used.split(), "Most used")
-        for param in self.get_params(ctx):
-            row = param.get_help_record(ctx)
-            if row is not None and isinstance(param, click.Option):
-                sections[title_of.get(param.name or "", "Options")].append(row)
-        for title, rows in sections.items():
-            if rows:
+        params = self.get_params(ctx)
+        for title in ("Most used", "Options", "Model", "Work and limits"):
+            own = [p for p in params if title_of.get(p.name or "", "Options") == title]
+            if rows := [*filter(None, (param.get_help_record(ctx) for param in own))]:
                 with formatter.section(title):
                     formatter.write_dl(rows)
 
