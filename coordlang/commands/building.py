@@ -106,12 +106,10 @@ def build_language(
             job = replace(job, effort=0)
         # It is verified now, for there is no time when an anytime method is stopped.
         incumbent = first_language(job)
-        job = replace(job, incumbent=incumbent)
+        job = replace(job, incumbent=incumbent, by_clauses=reserve > 0)
         making.check(incumbent)
         making.note("incumbent")
-        if reserve:
-            job = replace(job, by_clauses=True)
-            start_clock((1 - reserve) * time_left())
+        start_clock((1 - reserve) * time_left())
     progress(f"building words ({method})")
     found = _outcome(job, options, making)
     making.note("verify")
