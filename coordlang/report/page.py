@@ -129,13 +129,18 @@ def word_rows(used: TaskLanguage, lifted: LiftedWords | None) -> tuple[list[dict
         told = describe_words(mapped, all_covers(mapped))
         in_order, rest = told.in_order, {word for word, cover in told.rules if cover is None}
         terms = {word: [*map(term_text, own.terms if own else ())] for word, own in told.rules}
-    return [_word_row(language, word, own, word in rest) for word, own in terms.items()], in_order
+    sizes = language.sizes()
+    rows = [_word_row(language, sizes, word, own, word in rest) for word, own in terms.items()]
+    return rows, in_order
 
 
 def _word_row(
-    language: Language, word: str, terms: Sequence[str] | None, is_rest: bool
+    language: Language,
+    sizes: Mapping[str, int],
+    word: str,
+    terms: Sequence[str] | None,
+    is_rest: bool,
 ) -> dict[str, Any]:
-    sizes = language.sizes()
     states = (key for key, own in language.states.items() if own == word)
     return {
         "name": word,
