@@ -17,7 +17,7 @@ from coordlang.language.sentences import sentence
 from planners.joint.model import FullState, Goal, JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import conjuncts, formula_text
-from planners.search.plan_file import NotAPlan, WholeStep, json_count
+from planners.search.plan_file import NotAPlan, WholeStep, json_count, require_one_each
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, Texts, counts
 from planners.system.errors import Refuted
@@ -113,6 +113,7 @@ def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan,
 
 
 def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:
+    require_one_each(model, step, number)
     found = []
     for robot, (name, text) in enumerate(zip(model.robots, step, strict=True)):
         label = model.label_number(robot, text)

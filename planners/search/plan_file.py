@@ -229,18 +229,24 @@ def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[T
         )
     for plan in file.plans:
         for number, step in enumerate(plan.actions):
-            if len(step) != len(model.robots):
-                raise BadInput(
-                    f"step {number} must have one text or null for each "
-                    f"of {', '.join(model.robots)}",
-                    position=position,
-                    remedy='As in ["(move r1 a b)", null]: null is a robot that idles.',
-                )
+            require_one_each(model, step, number, position)
     order = [robots.index(robot) for robot in model.robots]
     return [
         tuple(tuple(_spelled(step[k]) for k in order) for step in plan.actions)
         for plan in file.plans
     ]
+
+
+def require_one_each(
+    model: JointModel, step: Sequence[object], number: int, position: Position | None = None
+) -> None:
+    """Raise `BadInput` for a step that has not one text or None for each robot."""
+    if len(step) != len(model.robots):
+        raise BadInput(
+            f"step {number} must have one text or null for each of {', '.join(model.robots)}",
+            position=position,
+            remedy='As in ["(move r1 a b)", null]: null is a robot that idles.',
+        )
 
 
 def _spelled(text: str | None) -> str | None:

@@ -199,6 +199,8 @@ def test_say_and_understand(language: Path, tmp_path: Path) -> None:
         door.say(language, *T_MAP, [("(move r1 c0-1 c1-1)", "(move r2 c1-0 c1-1)")])
     with pytest.raises(door.NotOptimal):
         door.say(language, *T_MAP, [(None, None), *plans[0]])
+    with pytest.raises(door.CoordlangError, match="step 0 must have one text or null for each"):
+        door.say(language, *T_MAP, [[]])
 
 
 def test_formulas_and_demands(language: Path) -> None:
