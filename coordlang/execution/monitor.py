@@ -353,7 +353,8 @@ class EventMonitor(Monitor):
         # partners in what.
         self._observed: dict[str, int] = dict.fromkeys(self._others, 0)
         self._ended: dict[tuple[str, str], int] = {}
-        self._ready: dict[str, str] = {}
+        #: Of each robot that is ready for a meeting what it will do, and as which of its events.
+        self._ready: dict[str, tuple[str, int]] = {}
         self._underway: str | None = None
 
     def _read_events(self, entry: Mapping[str, Any], where: str) -> dict[str, str]:
@@ -407,7 +408,9 @@ class EventMonitor(Monitor):
             return {}
         own = self._events[event]
         found: dict[str, int | str] = {
-            robot: its for robot, its in own["with"].items() if self._ready.get(robot) != its
+            robot: its
+            for robot, its in own["with"].items()
+            if self._ready.get(robot, ("", 0))[0] != its
         }
         for robot, number in own["after"].items():
             texts = {*self._interferes.get(own["subaction"], {}).get(robot, ())}
@@ -488,13 +491,17 @@ class EventMonitor(Monitor):
         if may_be[number - 1][text] > sum(self._ended.get(("", own), 0) for own in waits_for):
             raise NotPossible(f"{what}: it waits for {self.robot}")
         self._observed = {**self._observed, robot: number}
-        self._forget_ready([robot])
+        if self._ready.get(robot, ("", 0))[1] <= number:
+            self._forget_ready([robot])
         self._count(robot, text)
 
-    def ready(self, robot: str, subaction: str) -> None:
-        """Tell that another robot is ready to start this together with an own event."""
+    def ready(self, robot: str, subaction: str, number: int = 0) -> None:
+        """Tell that another robot is ready to start this together with an own event.
+
+        It is so until its event ``number``, from 1, is told to have ended; 0: until any is.
+        """
         self._events_of(robot)
-        self._ready = {**self._ready, robot: _plain(subaction)}
+        self._ready = {**self._ready, robot: (_plain(subaction), number)}
 
     def _forget_ready(self, robots: Iterable[str]) -> None:
         self._ready = {name: its for name, its in self._ready.items() if name not in robots}

@@ -226,7 +226,7 @@ class Robot:
             if notice.kind == "ended":
                 monitor.ended(name, notice.subaction, notice.number)
             else:
-                monitor.ready(name, notice.subaction)
+                monitor.ready(name, notice.subaction, notice.number)
         except NotPossible:  # they have agreed on nothing
             self.events.append(("contradicted", {}))
 

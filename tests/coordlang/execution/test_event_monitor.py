@@ -159,8 +159,7 @@ def test_what_cannot_have_happened_is_refused() -> None:
     r1.did(first)
     (further,) = r1.allowed()
     assert further
-    assert r1.missing(further) == {"r2": 1}
-    assert (r1.may_start(), r1.late()) == ((), ("r2",))
+    assert (r1.missing(further), r1.may_start(), r1.late()) == ({"r2": 1}, (), ("r2",))
     with pytest.raises(NotPossible, match="it waits for 1 more of r2"):
         r1.start(further)
     with pytest.raises(MonitorError, match="no robot r3"):
@@ -178,8 +177,7 @@ def test_what_cannot_have_happened_is_refused() -> None:
         r2.ended("r1", r1.subaction(further), 2)
     r1.start(further)
     r1.did(further)
-    assert r1.finished
-    assert r1.late() == ()
+    assert (r1.finished, r1.late()) == (True, ())
 
 
 def test_while_an_event_is_under_way_it_is_all_that_may_end() -> None:
@@ -212,6 +210,9 @@ def test_who_was_ready_for_a_meeting_is_not_ready_for_the_next_one() -> None:
     r1.ready("r2", "(lift r2)")
     (event,) = r1.allowed()
     assert r1.missing(event) == {"r3": "(hold r3)"}
+    r1.ready("r3", "(hold r3)", 2)
+    r1.ended("r3", "(hold r3)", 1)  # is heard of late
+    assert r1.may_start() == (event,)
 
 
 JOINT = """(define (domain together) (:predicates (p) (q))
@@ -227,18 +228,17 @@ JOINT = """(define (domain together) (:predicates (p) (q))
 
 def test_what_others_do_while_a_robot_idles_is_not_known_to_it() -> None:
     """Nobody tells it when that happens: idling is no event."""
-    problem = "(define (problem p) (:domain together) (:init) (:goal (q)))"
-    r1, r2 = monitors_of(choices_in(JOINT, problem))
+    found = choices_in(JOINT, "(define (problem p) (:domain together) (:init) (:goal (q)))")
+    r1, r2 = monitors_of(found)
     assert (r1.known("(p)"), r1.known("(q)")) == (None, False)
     assert (r2.known("(p)"), r2.known("(q)")) == (False, None)
 
 
 def test_what_is_told_in_no_way_that_can_be_read() -> None:
-    r1, r2 = monitors_of(turning_round())
-    (its,) = r2.allowed()
+    r1, _ = monitors_of(turning_round())
     for number in (1.0, True, "1", None):
         with pytest.raises(MonitorError, match="numbered from 1"):
-            r1.ended("r2", str(its), number)  # type: ignore[arg-type]
+            r1.ended("r2", "(move r2 c0-0 c0-1)", number)  # type: ignore[arg-type]
     for ask in (r1.subaction, r1.partners, r1.concerns):
         with pytest.raises(MonitorError, match="no event of r1"):
             ask("(move r1 c9 c9)")
@@ -248,7 +248,7 @@ def test_what_is_told_in_no_way_that_can_be_read() -> None:
 
 def test_an_event_that_waits_for_a_robot_that_there_is_not_is_refused() -> None:
     data = json.loads(to_bytes(turning_round()))
-    events = data["choices"][0]["passings"]["events"].values()
-    next(event for event in events if event["after"])["after"] = {"r3": 1}
+    for event in data["choices"][0]["passings"]["events"].values():
+        event["after"] = {"r3": 1}
     with pytest.raises(MonitorError, match="waits for r3: no such robot"):
         EventMonitor(data, "r1")
