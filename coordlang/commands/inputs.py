@@ -122,7 +122,7 @@ class Arguments:
         """
         if self.source.factored is not None:
             return self._read_factored(self.source.factored)
-        domain = getattr(self.loaded, "domain", self.values.get("DOMAIN"))
+        domain = self.loaded.domain if self.loaded else self.values.get("DOMAIN")
         problems, is_single = self.problems, "PROBLEMS..." not in self.values
         if domain is None or not problems or (is_single and len(problems) > 1):
             wanted = "one problem" if is_single else "problems"

@@ -177,6 +177,9 @@ class Agreement:
     _heard: dict[str, Message] = field(default_factory=dict)
     _said: dict[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self._said = self.said()
+
     def check(self, message: Message) -> None:
         """Raise `Refuted` if another robot follows another sentence."""
         if message.sentence is not None and self.sentence not in (None, message.sentence):
