@@ -125,7 +125,8 @@ def _arguments(options: BuildOptions) -> list[str]:
     """Return the keywords of a call as a language file records them (a command: as it is typed)."""
     files = {"tasks": options.tasks, "start": options.start}
     named = {**asdict(options.way), "words": options.words, "worst": options.worst}
-    named["effort"] = options.way.effort != EFFORT and options.way.effort
+    if options.way.effort == EFFORT:
+        del named["effort"]
     named |= {k: fspath(file) for k, file in files.items() if isinstance(file, str | PathLike)}
     return [f"{name}={value}" for name, value in sorted(named.items()) if value]
 

@@ -500,10 +500,10 @@ class Repaired:
 
     def data(self) -> dict[str, Any]:
         """The same as JSON data."""
-        data = {"still_holds": self.still_holds, "miscoordination": witness_data(self.witness)}
-        data |= msgspec.to_builtins(self)
+        data: dict[str, Any] = msgspec.to_builtins(replace(self, witness=None))
         del data["witness"]
-        return data
+        miscoordination = witness_data(self.witness)
+        return {"still_holds": self.still_holds, "miscoordination": miscoordination, **data}
 
     def text(self) -> str:
         """Why the language was changed, and which states have other words."""

@@ -87,12 +87,12 @@ class Command(click.Command):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options under four titles."""
-        title_of = {"no_cache": "Work and limits", "arguments": "of the usage line"}
+        title_of = {"no_cache": "Work and limits"}
         kinds = {Source: "Model", Jobs: "Work and limits", Limits: "Work and limits"}
         for kind, title in kinds.items():
             title_of |= {each.name: title for each in options_of(kind)}
         title_of |= dict.fromkeys(self.record.used.split(), "Most used")
-        params = self.get_params(ctx)
+        params = [param for param in self.get_params(ctx) if isinstance(param, click.Option)]
         for title in ("Most used", "Options", "Model", "Work and limits"):
             own = [p for p in params if title_of.get(p.name or "", "Options") == title]
             if rows := [*filter(None, (param.get_help_record(ctx) for param in own))]:

@@ -132,8 +132,8 @@ class MinimalSearch:
         self._merging: tuple[Assignment | None, Iterator[Assignment]] = None, iter(())
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
-        #: The language that was found last among all partitions.
-        self._found: Assignment | None = None
+        #: The language that was found last among all partitions, nothing before there is one.
+        self._found: Assignment = {}
         self.refuting: Mapping[Clause, Evidence] = {}
 
     @cached_property
