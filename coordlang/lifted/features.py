@@ -26,6 +26,7 @@ English, "the column of what ..".
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any, ClassVar, get_args
 
 import numpy as np
@@ -43,13 +44,12 @@ UNDEFINED = -2
 class Expression:
     """What is written as an s-expression: its head, and then its parts."""
 
-    __slots__ = ()
     HEAD: ClassVar[str]
     #: What is made of its parts, as a formula and in English.
     FORMS: ClassVar[tuple[str, str]]
     __match_args__: ClassVar[tuple[str, ...]]
 
-    @property
+    @cached_property
     def parts(self) -> list[object]:
         """What it is made of."""
         return [getattr(self, name) for name in self.__match_args__]
@@ -57,7 +57,7 @@ class Expression:
     def __str__(self) -> str:
         return f"({' '.join((self.HEAD, *map(str, self.parts)))})"
 
-    @property
+    @cached_property
     def complexity(self) -> int:
         """How much there is to say: one for each head and each name, and more for numbers.
 
@@ -84,7 +84,7 @@ class Expression:
 # ---- concepts
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Role(Expression):
     """A predicate with two arguments, read in either direction, one step or any number of them."""
 
@@ -119,7 +119,7 @@ class Role(Expression):
         return found
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Everything(Expression):
     """All objects."""
 
@@ -132,7 +132,7 @@ class Everything(Expression):
         return np.ones((len(states), len(states.world.objects)), bool)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Named(Expression):
     """The objects of a type, or of which a predicate with one argument is true."""
 
@@ -150,7 +150,7 @@ class Named(Expression):
         return found
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class One(Expression):
     """The object of a name; none where the problem does not have it."""
 
@@ -163,7 +163,7 @@ class One(Expression):
         return np.tile(own, (len(states), 1))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Without(Expression):
     """The objects that are not in a concept."""
 
@@ -175,7 +175,7 @@ class Without(Expression):
         return ~states.get(self.concept)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Both(Expression):
     """The objects in two concepts."""
 
@@ -188,7 +188,7 @@ class Both(Expression):
         return states.get(self.one) & states.get(self.other)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Some(Expression):
     """The objects that a role relates with one in a concept."""
 
@@ -207,7 +207,7 @@ Concept = Everything | Named | One | Without | Both | Some
 # ---- terms and numbers
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Term(Expression):
     """The object x with (predicate named x), or (predicate x named) if inverse.
 
@@ -231,7 +231,7 @@ class Term(Expression):
         return np.where(found == none, NONE, found)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Attribute(Expression):
     """An attribute of the object that a term names, `NONE` where it is not defined."""
 
@@ -247,7 +247,7 @@ class Attribute(Expression):
         return np.append(known, NONE)[states.get(self.term)]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Distance(Expression):
     """The links of a static relation between the objects of two terms; `NONE` without a way."""
 
@@ -263,7 +263,7 @@ class Distance(Expression):
         return np.where((here == NONE) | (there == NONE), NONE, far)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Count(Expression):
     """How many atoms of a predicate are true that have some objects where they are named."""
 
@@ -282,7 +282,7 @@ class Count(Expression):
         return np.bincount(state[hit], minlength=len(states))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Size(Expression):
     """How many objects are in a concept."""
 
@@ -295,7 +295,7 @@ class Size(Expression):
         return size
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Gap(Expression):
     """The fewest links of a static relation from an object of one concept to one of another."""
 
@@ -331,7 +331,7 @@ def _defined(value: Any, *numbers: Ints) -> Ints:
     return np.where(np.any([number == NONE for number in numbers], axis=0), UNDEFINED, value)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Sign(Expression):
     """Which of two numbers is larger: -1, 0 or 1."""
 
@@ -347,7 +347,7 @@ class Sign(Expression):
         return _defined(np.sign(one - other), one, other)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Residue(Expression):
     """What is left of a number by division."""
 
@@ -361,7 +361,7 @@ class Residue(Expression):
         return _defined(number % self.modulus, number)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Least(Expression):
     """A number up to a most."""
 
@@ -375,7 +375,7 @@ class Least(Expression):
         return _defined(np.minimum(number, self.most), number)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Same(Expression):
     """Whether two terms name one object: 0 or 1."""
 

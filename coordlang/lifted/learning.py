@@ -12,7 +12,7 @@ from.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
@@ -158,6 +158,8 @@ _REMEMBER = (
 )
 #: Sets of features that are tried for fewer words.
 _TRIED = 8
+#: The complexity of features that are found soon; one more takes up to three times as long.
+_SOON = 8
 
 
 Progress = Callable[[str], None]
@@ -201,7 +203,7 @@ class Learned:
     the features looked at (with the concepts and numbers of which they are made), ``pool`` those of
     them that differ, ``rounds`` how often classes were refuted, ``taken`` the problems learned
     from: the known ones, and those held back that refuted what had been learned. ``stopped`` is
-    what ended the search for fewer words, or None: the words are verified all the same.
+    what ended the search early, or None: the words are verified all the same.
     """
 
     features: tuple[Feature, ...]
@@ -233,19 +235,36 @@ def learn(
     """The simplest features that suffice for the candidate tasks of all these problems.
 
     Each class of states with equal features has a word of its own; under ``prefer`` classes share
-    words, as far as that is found before a limit; then the words so far are returned, with
-    ``stopped`` set.  ``held_back`` are learned from only where they refute what was
-    learned from ``known``.  Places of different maps are named, as landmarks, only where no other
-    features suffice.
+    words.  Features up to complexity 8 come first: at a limit the words so far are returned, with
+    ``stopped`` set, if there are any.  ``held_back`` are learned from only where they refute what
+    was learned from ``known``.  Places of different maps are named, as landmarks, only where no
+    other features suffice.
 
     Raises `ProvedImpossible` if no features up to this ``complexity`` suffice; the error has the
     states that must be told apart.
     """
-    learner = _Learner(known, held_back, complexity, seed, workers or Workers(), progress)
-    found = [learner.verified(None)]
-    if prefer is None:
-        return found[0]
-    stopped = run_until_stopped(lambda: found.append(learner.verified(prefer)))
+    learner = _Learner(known, held_back, seed, workers or Workers(), progress)
+    found: list[Learned] = []
+
+    def search() -> None:
+        soon = min(_SOON, complexity)
+        learner.begin(soon)
+        with suppress(ProvedImpossible) if soon < complexity else nullcontext():
+            found.append(learner.verified(None))
+        most = complexity
+        if found and prefer is None and not learner.landmarks:
+            # What is heavier alone than features that suffice is not among the simplest.
+            most = min(complexity, sum(own.complexity for own in found[-1].features) - 1)
+        if most > soon:
+            learner.begin(most)
+            found.append(learner.verified(None))
+        if prefer is not None:
+            found.append(learner.verified(prefer))
+
+    stopped = run_until_stopped(search)
+    if not found:
+        assert stopped is not None
+        raise stopped
     return replace(found[-1], stopped=stopped)
 
 
@@ -279,7 +298,6 @@ class _Learner:
         self,
         known: Sequence[Instance],
         held_back: Sequence[Instance],
-        complexity: int,
         seed: int,
         workers: Workers,
         progress: Progress,
@@ -287,15 +305,14 @@ class _Learner:
         self.taken = [_Taken(own, seed, progress, None) for own in known]
         self.rounds = 0
         self._every, self._workers = [*known, *held_back], workers
-        self._complexity, self._seed, self._progress = complexity, seed, progress
-        self.begin()
+        self._seed, self._progress = seed, progress
 
-    def begin(self, landmarks: bool = False) -> None:
-        """Find the features that there are in the problems that were taken."""
-        self.landmarks = landmarks
+    def begin(self, complexity: int, landmarks: bool = False) -> None:
+        """Find the features up to a complexity that there are in the problems that were taken."""
+        self.landmarks, self._complexity = landmarks, complexity
         states = [States(taken.own.states.world, taken.own.states.rows) for taken in self.taken]
-        self._progress("finding features that tell states apart")
-        self._pool = pool_of(states, self._complexity, landmarks)
+        self._progress(f"finding features up to complexity {complexity}")
+        self._pool = pool_of(states, complexity, landmarks)
         ends = np.cumsum([len(own) for own in states])
         tables = np.split(self._pool.values, ends[:-1], axis=1)
         for taken, table in zip(self.taken, tables, strict=True):
@@ -309,14 +326,14 @@ class _Learner:
             except ProvedImpossible:
                 if self.landmarks:
                     raise
-                self.begin(landmarks=True)
+                self.begin(self._complexity, landmarks=True)
                 continue
             for own, of_states in zip(self._every, words, strict=True):
                 if not own.holds(of_states, self._workers, self._progress):
                     known = (taken.own for taken in self.taken)
                     assert own not in known, "what was learned from is a language there"
                     self.taken.append(_Taken(own, self._seed, self._progress, of_states))
-                    self.begin(self.landmarks)
+                    self.begin(self._complexity, self.landmarks)
                     break
             else:
                 return replace(learned, rounds=self.rounds, taken=len(self.taken))

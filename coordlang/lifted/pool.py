@@ -190,6 +190,8 @@ def _concepts(vocabulary: _Vocabulary, states: Sequence[States], most: int) -> l
     levels: list[list[Concept]] = [[]]
     entries = sum(len(own) * len(own.world.objects) for own in states)
     for complexity in range(1, most - 2):
+        if complexity > 1 and not any(levels[(complexity - 1) // 2 :]):
+            break  # larger ones would be made of these
         levels.append([])
         for concept in sorted(_next_concepts(vocabulary, levels, complexity), key=str):
             key = b"".join(np.packbits(concept(own)).tobytes() for own in states)
