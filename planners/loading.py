@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from os import PathLike
 
 from planners.grounding.actions import GroundAction, apply_network, impossible_actions
-from planners.grounding.instantiate import FEWER, ground_actions, ground_goal, idling_costs
+from planners.grounding.instantiate import FEWER, goal_grounder, ground_actions, idling_costs
 from planners.joint.composition import ComposingStepper, JointActionStepper
 from planners.joint.conditions import Evaluator
 from planners.joint.model import IDLE, SLACK_LEFT, JointModel, PlanningTask, Stepper, show
@@ -167,7 +167,7 @@ def _step_atoms(subactions: Sequence[Sequence[GroundAction]]) -> dict[StepAtom, 
 
 def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask:
     """The planning task of a problem."""
-    goal = ground_goal(domain, problem, problem.goal)
+    goal = goal_grounder(domain, problem)(problem.goal)
     return PlanningTask(
         problem.name, model.state(problem.init), goal, Position(problem.source.name)
     )

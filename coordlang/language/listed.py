@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from planners.grounding.instantiate import ground_goal
+from planners.grounding.instantiate import goal_grounder
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask, show
 from planners.joint.states import split_atoms
 from planners.joint.tables import Bools
@@ -63,7 +63,7 @@ def model_of_listed(
 
     Raises `BadInput` for a text that is no atom or formula of the problem.
     """
-    ground = [ground_task(domain, problems[0], task, position) for task in listed]
+    ground = [*ground_tasks(domain, problems[0], listed, position)]
     loaded = build(domain, problems, options, inits=[init for init, _ in ground])
     tasks = [
         PlanningTask(f"{number}", loaded.model.state(init), goal)
@@ -85,25 +85,31 @@ def goal_atoms(goal: Goal) -> tuple[str, ...]:
     return tuple(map(formula_text, conjuncts(goal)))
 
 
-def ground_task(
-    domain: Domain, problem: Problem, task: ListedTask, position: Position | None = None
-) -> tuple[frozenset[Atom], Formula]:
-    """The true fluents at the start, and the ground goal.
+def ground_tasks(
+    domain: Domain, problem: Problem, listed: Iterable[ListedTask], position: Position | None = None
+) -> Iterator[tuple[frozenset[Atom], Formula]]:
+    """The true fluents at the start, and the ground goal, of each task.
 
     Everything static comes from the problem.  Raises `BadInput` for a text that is no atom or
     formula of it.
     """
-    goal = And(tuple(_read_text(domain, problem, text, position) for text in task.goal))
-    return _read_init(domain, problem, task, position), ground_goal(domain, problem, goal)
+    names = Names(domain.types, domain.predicates, objects=problem.objects)
+    fluents, ground = fluent_predicates(domain), goal_grounder(domain, problem)
+    for task in listed:
+        goal = And(tuple(_read_text(names, text, position) for text in task.goal))
+        yield _read_init(names, problem, fluents, task, position), ground(goal)
 
 
 def _read_init(
-    domain: Domain, problem: Problem, task: ListedTask, position: Position | None
+    names: Names,
+    problem: Problem,
+    fluents: Set[str],
+    task: ListedTask,
+    position: Position | None,
 ) -> frozenset[Atom]:
-    fluents = fluent_predicates(domain)
     atoms = set()
     for text in task.init:
-        formula = _read_text(domain, problem, text, position)
+        formula = _read_text(names, text, position)
         if not isinstance(formula, Atom):
             raise BadInput(
                 f"{text} is no atom: 'init' lists what is true",
@@ -120,7 +126,7 @@ def _read_init(
     return frozenset(atom for atom in atoms if atom.predicate in fluents)
 
 
-def _read_text(domain: Domain, problem: Problem, text: str, position: Position | None) -> Formula:
+def _read_text(names: Names, text: str, position: Position | None) -> Formula:
     try:
         parts = split_atoms(text)
         if len(parts) != 1:
@@ -128,7 +134,6 @@ def _read_text(domain: Domain, problem: Problem, text: str, position: Position |
                 "expected one PDDL literal", remedy="As in (at r1 a) or (not (at r1 a))."
             )
         root = parse(Source(position.file if position else "task", parts[0]))
-        names = Names(domain.types, domain.predicates, objects=problem.objects)
         return read_formula(names, root)
     except BadInput as error:
         raise BadInput(f"{text}: {error.what}", position=position, remedy=error.remedy) from None

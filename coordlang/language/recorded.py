@@ -16,7 +16,7 @@ from coordlang.language.candidates import (
     from_problems,
     from_recorded,
 )
-from coordlang.language.listed import ListedTask, first_of_equal, goal_text, ground_task
+from coordlang.language.listed import ListedTask, first_of_equal, goal_text, ground_tasks
 from coordlang.language.provenance import domain_sha256, states_sha256, world_sha256
 from coordlang.language.words import Language
 from planners.joint.model import show
@@ -212,8 +212,8 @@ def _require_pairs(recorded: list[ListedTask], candidates: Candidates, position:
     facts = model.codec.facts.texts
     reached = {frozenset(facts[n] for n in model.codec.true_facts(row)) for row in states}
     ends: dict[tuple[str, ...], int] = {}
-    for task in recorded:
-        init, goal = ground_task(loaded.domain, loaded.problems[0], task, position)
+    ground = ground_tasks(loaded.domain, loaded.problems[0], recorded, position)
+    for task, (init, goal) in zip(recorded, ground, strict=True):
         start = frozenset(map(show, init))
         if task.goal not in ends:
             ends[task.goal] = int(model.holds(goal, states).sum())

@@ -21,7 +21,7 @@ from coordlang.execution.best_sentence import leading_sentences
 from coordlang.execution.plan_sentence import carried_out
 from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.language.candidates import describe, explored_if_small
-from coordlang.language.listed import goal_text, ground_task
+from coordlang.language.listed import goal_text, ground_tasks
 from coordlang.language.recorded import recorded_list
 from coordlang.language.sentences import Sentence, number_of_sentences
 from coordlang.language.words import Language
@@ -167,7 +167,7 @@ def _candidates(
     else:
         listed = recorded_list(first.language)
         random.shuffle(listed)
-        ground = (ground_task(domain, problem, one, position) for one in listed)
+        ground = ground_tasks(domain, problem, listed, position)
         tasks = (PlanningTask("listed", first.model.state(init), goal) for init, goal in ground)
     for task in tasks:
         init = task.init[None, :]

@@ -6,7 +6,7 @@ Static atoms, equalities and types are evaluated.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 from functools import cache
 from math import prod
@@ -100,9 +100,10 @@ def idling_costs(domain: Domain, problem: Problem, team: Team, *, costs: bool) -
     return tuple(min((cost for owner, cost in found if owner == r), default=0) for r in robots)
 
 
-def ground_goal(domain: Domain, problem: Problem, goal: Formula) -> Formula:
-    """A goal formula over fluent atoms, in negation normal form."""
-    return _Grounder(domain, problem, Team((), ""), {}).formula(goal, {}, True)
+def goal_grounder(domain: Domain, problem: Problem) -> Callable[[Formula], Formula]:
+    """Makes goals formulas over fluent atoms, in negation normal form."""
+    grounder = _Grounder(domain, problem, Team((), ""), {})
+    return lambda goal: grounder.formula(goal, {}, True)
 
 
 def _terms(leaves: Iterable[Atom | StepAtom | Equal]) -> set[str]:

@@ -16,7 +16,7 @@ from coordlang.execution.guided_search import plan_under_sentence
 from coordlang.execution.plan_sentence import NotOptimal, PlanDag, sentence_of_plan
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from coordlang.language.candidates import Candidates
-from coordlang.language.listed import ground_task
+from coordlang.language.listed import ground_tasks
 from planners.check.rules import validate
 from planners.joint.model import PlanningTask
 from planners.joint.tables import Rows
@@ -106,7 +106,7 @@ def judged(
     loaded, model = candidates.loaded, candidates.model
     said: tuple[Texts, ...] = texts(model, plan)
     problem = loaded.problems[0]
-    init, goal = ground_task(loaded.domain, problem, candidates.listed[0])
+    ((init, goal),) = ground_tasks(loaded.domain, problem, candidates.listed[:1])
     asked = replace(problem, init=init | static_atoms(loaded.domain, problem), goal=goal)
     verdict = validate(loaded.domain, asked, loaded.team, said)
     if not verdict.valid:
@@ -146,7 +146,7 @@ def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str,
             with pytest.raises(NoPlanFits):
                 plan_under_sentence(task_language, task_language.words_of(unsaid))
     problem = loaded.problems[0]
-    init, goal = ground_task(loaded.domain, problem, candidates.listed[0])
+    ((init, goal),) = ground_tasks(loaded.domain, problem, candidates.listed[:1])
     searches = 0
     for name in names:
         without = plan_under_sentence(task_language, None, HEURISTICS[name])
