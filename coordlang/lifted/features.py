@@ -49,7 +49,7 @@ class Expression:
     FORMS: ClassVar[tuple[str, str]]
     __match_args__: ClassVar[tuple[str, ...]]
 
-    @cached_property
+    @property
     def parts(self) -> list[object]:
         """What it is made of."""
         return [getattr(self, name) for name in self.__match_args__]

@@ -12,7 +12,7 @@ from.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import closing, nullcontext, suppress
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
@@ -243,20 +243,23 @@ def learn(
     Raises `ProvedImpossible` if no features up to this ``complexity`` suffice; the error has the
     states that must be told apart.
     """
-    learner = _Learner(known, held_back, seed, workers or Workers(), progress)
+    soon = min(_SOON, complexity)
+    learner = _Learner(known, held_back, soon, seed, workers or Workers(), progress)
     found: list[Learned] = []
 
     def search() -> None:
-        soon = min(_SOON, complexity)
-        learner.begin(soon)
-        with suppress(ProvedImpossible) if soon < complexity else nullcontext():
+        try:
             found.append(learner.verified(None))
+        except ProvedImpossible:
+            if soon == complexity:
+                raise
         most = complexity
         if found and prefer is None and not learner.landmarks:
             # What is heavier alone than features that suffice is not among the simplest.
             most = min(complexity, sum(own.complexity for own in found[-1].features) - 1)
         if most > soon:
-            learner.begin(most)
+            learner.complexity = most
+            learner.begin()
             found.append(learner.verified(None))
         if prefer is not None:
             found.append(learner.verified(prefer))
@@ -298,6 +301,7 @@ class _Learner:
         self,
         known: Sequence[Instance],
         held_back: Sequence[Instance],
+        complexity: int,
         seed: int,
         workers: Workers,
         progress: Progress,
@@ -305,14 +309,15 @@ class _Learner:
         self.taken = [_Taken(own, seed, progress, None) for own in known]
         self.rounds = 0
         self._every, self._workers = [*known, *held_back], workers
-        self._seed, self._progress = seed, progress
+        self.complexity, self._seed, self._progress = complexity, seed, progress
+        self.begin()
 
-    def begin(self, complexity: int, landmarks: bool = False) -> None:
-        """Find the features up to a complexity that there are in the problems that were taken."""
-        self.landmarks, self._complexity = landmarks, complexity
+    def begin(self, landmarks: bool = False) -> None:
+        """Find the features up to ``complexity`` that there are in the problems that were taken."""
+        self.landmarks = landmarks
         states = [States(taken.own.states.world, taken.own.states.rows) for taken in self.taken]
-        self._progress(f"finding features up to complexity {complexity}")
-        self._pool = pool_of(states, complexity, landmarks)
+        self._progress(f"finding features up to complexity {self.complexity}")
+        self._pool = pool_of(states, self.complexity, landmarks)
         ends = np.cumsum([len(own) for own in states])
         tables = np.split(self._pool.values, ends[:-1], axis=1)
         for taken, table in zip(self.taken, tables, strict=True):
@@ -326,14 +331,14 @@ class _Learner:
             except ProvedImpossible:
                 if self.landmarks:
                     raise
-                self.begin(self._complexity, landmarks=True)
+                self.begin(landmarks=True)
                 continue
             for own, of_states in zip(self._every, words, strict=True):
                 if not own.holds(of_states, self._workers, self._progress):
                     known = (taken.own for taken in self.taken)
                     assert own not in known, "what was learned from is a language there"
                     self.taken.append(_Taken(own, self._seed, self._progress, of_states))
-                    self.begin(self._complexity, self.landmarks)
+                    self.begin(self.landmarks)
                     break
             else:
                 return replace(learned, rounds=self.rounds, taken=len(self.taken))
@@ -419,7 +424,7 @@ class _Learner:
         apart: Bools = (taken.table[:, pairs[:, 0]] != taken.table[:, pairs[:, 1]]).any(axis=1)
         apart[list(excluded)] = False
         if not apart.any():
-            raise _too_weak(taken.own, pairs, self._complexity)
+            raise _too_weak(taken.own, pairs, self.complexity)
         return apart
 
 
