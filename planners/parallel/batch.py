@@ -12,6 +12,7 @@ import os
 import pickle
 import stat
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -44,6 +45,9 @@ _LARGEST = 4
 _LEFT_BEHIND = 3_600
 #: How often a table is written in a folder that others remove meanwhile.
 _TRIES = 3
+#: Reading is for one thread at a time: numpy parses the head of each array as Python, and CPython
+#: up to 3.12 counts how deep it is in a syntax tree for all threads together (gh-106905).
+_PARSING = threading.Lock()
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +164,7 @@ class Store:
             why = "does not fit into the memory"
         content = data[32:]
         if data[:32] == _hash(key, content):
-            with np.load(BytesIO(content), allow_pickle=False) as arrays:
+            with _PARSING, np.load(BytesIO(content), allow_pickle=False) as arrays:
                 return dict(arrays)
         note(f"{path} {why}: it is ignored, and its result is worked out again")
         with suppress(OSError):  # it is gone already, or the folder is only read
