@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
@@ -119,8 +118,12 @@ def model_digest(model: JointModel) -> str:
     """A hash of all that a search reads of a joint model, whatever files it was made from."""
     from planners.parallel.batch import digest
 
+    read = (
+        (a.label, a.precondition, a.owners, a.parts, a.cost, sorted(map(repr, a.links)), a.effects)
+        for a in model.actions
+    )
     return digest(
-        tuple(_texts(model.actions)),
+        tuple(map(repr, read)),  # in PDDL an atom and an action as a literal may be one text
         model.robots,
         model.labels,
         model.idling_costs,
@@ -141,14 +144,3 @@ def key_of(model: str, task: PlanningTask) -> str:
     goal = task.goal
     wanted = goal.facts if isinstance(goal, FullState) else repr(goal)
     return digest(code_hash("planners"), np.version.version, model, task.init, wanted)
-
-
-def _texts(actions: Iterable[GroundAction]) -> Iterator[str]:
-    """All that a search reads of ground actions.
-
-    As `repr` has it: in PDDL an atom and an action as a literal may be one text.
-    """
-    for action in actions:
-        links = sorted(map(repr, action.links))
-        rest = (action.owners, action.parts, action.cost, links, action.effects)
-        yield f"{action.label} {action.precondition!r} {rest!r}"
