@@ -30,9 +30,9 @@ from tests.support.texts import model_of
 PIECE_SIZES = (
     PIECES,
     replace(PIECES, probe=0, effort=3_000),
-    replace(PIECES, probe=0, effort=100_000, states=3, joint_labels=0),
+    replace(PIECES, probe=0, effort=20_000, states=3, joint_labels=0),
     replace(PIECES, states=2, steps=5),
-    replace(PIECES, probe=0, effort=100_000, question=0, joint_labels=0),
+    replace(PIECES, probe=0, effort=20_000, question=0, joint_labels=0),
     replace(PIECES, probe=0, effort=300, question=0),
     replace(PIECES, probe=1, effort=4_000),
 )
