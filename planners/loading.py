@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 
@@ -19,11 +19,11 @@ from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import Team, find_team, fluent_predicates, natural, static_atoms
 from planners.system.errors import BadInput, Position, UsageError
 from planners.system.limits import reaching
-from planners.system.messages import echoed
+from planners.system.messages import Presented, echoed
 
 
-@dataclass(frozen=True, slots=True)
-class PlanningInstance:
+@dataclass(frozen=True, slots=True, repr=False)
+class PlanningInstance(Presented):
     """A joint model with the files and options it was made from and one task per problem."""
 
     domain: Domain
@@ -32,6 +32,11 @@ class PlanningInstance:
     tasks: tuple[PlanningTask, ...]
     options: ModelOptions
     team: Team
+
+    def summary(self) -> Mapping[str, object]:
+        """Whose model it is."""
+        problems = tuple(problem.name for problem in self.problems)
+        return {"domain": self.domain.name, "problems": problems, "robots": self.team.robots}
 
 
 def load(
@@ -97,8 +102,11 @@ def _joint_model(
     robots = team.robots
     subactions = [[a for a in actions if robot in a.owners] for robot in range(len(robots))]
     labels = _labels(subactions, is_joint_action=domain.is_joint_action)
-    possible = starts | _added(actions)
-    fluents, slack = fluent_predicates(domain), _slack_atoms(options)
+    possible = starts | {e.atom for action in actions for e in action.effects if e.adds}
+    # What says how many steps of the slack are left, where words see that.
+    left = range(options.slack + 1) if options.words_see_slack else ()
+    slack = [Atom(SLACK_LEFT, (str(steps),)) for steps in left]
+    fluents = fluent_predicates(domain)
     facts = FactTable.of([*(atom for atom in possible if atom.predicate in fluents), *slack])
     codec = StateCodec(facts, robots, labels if options.remember_actions else None)
     evaluator = Evaluator(facts, _step_atoms(subactions))
@@ -127,16 +135,6 @@ def _joint_model(
         is_asynchronous=options.asynchronous,
         impossible=impossible_actions(domain, problem, team, actions, possible),
     )
-
-
-def _added(actions: Sequence[GroundAction]) -> set[Atom]:
-    return {effect.atom for action in actions for effect in action.effects if effect.adds}
-
-
-def _slack_atoms(options: ModelOptions) -> list[Atom]:
-    """What says how many steps of the slack are left, where words see that."""
-    left = range(options.slack + 1) if options.words_see_slack else ()
-    return [Atom(SLACK_LEFT, (str(k),)) for k in left]
 
 
 def _labels(
@@ -168,9 +166,8 @@ def _step_atoms(subactions: Sequence[Sequence[GroundAction]]) -> dict[StepAtom, 
 def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask:
     """The planning task of a problem."""
     goal = goal_grounder(domain, problem)(problem.goal)
-    return PlanningTask(
-        problem.name, model.state(problem.init), goal, Position(problem.source.name)
-    )
+    position = Position(problem.source.name)
+    return PlanningTask(problem.name, model.state(problem.init), goal, position)
 
 
 def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:

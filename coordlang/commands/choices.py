@@ -50,7 +50,7 @@ STATES_SHOWN = 40
 _IDLING = {"step": "idle", "event": "nothing more"}
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class RobotsChoices(InTask):
     """The subplans that each robot may follow under a sentence, whatever the others choose.
 

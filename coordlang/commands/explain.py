@@ -92,7 +92,7 @@ class WordsExplained:
         return "\n".join(lines)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Explanation(InTask):
     """The words as formulas, and the sentences of one task, found when they are asked for.
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, public
@@ -30,7 +30,7 @@ class ExportedTrees(InTask):
     ``xml`` is a document of BehaviorTree.CPP 4; ``subplans``: how many ways each robot has.
     """
 
-    used: TaskLanguage
+    used: TaskLanguage = field(compare=False)
     xml: str
     subplans: dict[str, int]
     guaranteed: bool

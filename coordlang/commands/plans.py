@@ -92,11 +92,12 @@ class OptimalPlans(Presented):
 
         return to_plansys2(self._plans, self._known(plan))
 
-    def data(self, listed: Sequence[Sequence[Texts]]) -> dict[str, Any]:
-        """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""
+    def data(self, listed: Sequence[Sequence[Texts]] | None = None) -> dict[str, Any]:
+        """Return a JSON plan file (docs/formats.md) with these plans, by default the first ten."""
         from planners.search.plan_file import to_json
 
-        return to_json(self._plans, [self._known(plan) for plan in listed])
+        plans = islice(self, DEFAULT_MAX) if listed is None else listed
+        return to_json(self._plans, [self._known(plan) for plan in plans])
 
     def _texts(self, plan: Plan) -> PlanSteps:
         return texts(self._plans.space.model.in_step, self._plans.steps(plan))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from os import PathLike, fspath
 from typing import Any
@@ -34,7 +34,7 @@ _BOUND = "relaxed"
 class Said(InTask):
     """The sentence of each plan."""
 
-    used: TaskLanguage
+    used: TaskLanguage = field(compare=False)
     sentences: tuple[str, ...]
     shown = ("sentences", "covered")
 
@@ -107,15 +107,17 @@ class SentencePlans(OptimalPlans, InTask):
         """Return the plans as the paths of a DAG."""
         return PlanDag(self.used, self._words, self._plans.space)
 
-    def data_with(self, listed: Sequence[Sequence[Texts]], graph: PlanDag | None) -> dict[str, Any]:
-        """Return a JSON plan file with sentence and guarantee, and with the DAG if one is given."""
+    def data(
+        self, listed: Sequence[Sequence[Texts]] | None = None, *, with_dag: bool = True
+    ) -> dict[str, Any]:
+        """Return a JSON plan file, as `OptimalPlans.data`, with sentence, guarantee and DAG."""
         return {
             "sentence": self.sentence,
             "covered": self.covered,
             "task": describe(self.used.space, self.used.task),
             **tolerance_data(self.tolerance),
-            **self.data(listed),
-            **(graph.data() if graph else {}),
+            **super().data(listed),
+            **(self.dag().data() if with_dag else {}),
         }
 
 
@@ -133,8 +135,7 @@ def understand(files: Arguments, options: UnderstandOptions) -> SentencePlans:
 
 def show_understand(found: SentencePlans, options: UnderstandOptions) -> int:
     """Print or write the plans."""
-    is_drawn = options.form == "json" and not options.listing.only_count
-    data = partial(found.data_with, graph=found.dag() if is_drawn else None)
+    data = partial(found.data, with_dag=not options.listing.only_count)
     show_listed(found, options, data, "plans", options.output)
     return covered_code(found)
 
@@ -181,13 +182,13 @@ class PlanUnderSentence(InTask):
     ``fulfilled`` has one entry for each preference.
     """
 
-    used: TaskLanguage
+    used: TaskLanguage = field(compare=False)
     sentence: str
     steps: PlanSteps
     search: GuidedPlan
     without_sentence: GuidedPlan
     fulfilled: tuple[Fulfilled, ...]
-    open_plans: SentencePlans
+    open_plans: SentencePlans = field(compare=False)
     shown = ("sentence", "cost", "expanded", "covered")
 
     @property
@@ -205,7 +206,7 @@ class PlanUnderSentence(InTask):
 
     def data(self) -> dict[str, Any]:
         """A JSON plan file (docs/formats.md) with the search and the preferences."""
-        data = self.open_plans.data_with([self.steps], None)
+        data = self.open_plans.data([self.steps], with_dag=False)
         work = [
             {"expanded": own.expanded, "generated": own.generated, "states": own.states}
             for own in (self.search, self.without_sentence)

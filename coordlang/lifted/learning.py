@@ -445,8 +445,7 @@ def _too_weak(own: Instance, pairs: Ints, complexity: int) -> ProvedImpossible:
 
 def _inseparable(candidates: Candidates) -> Inseparable:
     """What an empty clause means: plans that fail together have the same states."""
-    found = map(inseparable, candidates.spaces)
-    witness = next(one for one in found if one is not None)
+    witness = next(filter(None, map(inseparable, candidates.spaces)))
     error = Inseparable(witness, candidates.model)
     error.position = Position(candidates.loaded.problems[0].source.name)
     error.remedy = _REMEMBER

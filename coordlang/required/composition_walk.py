@@ -91,8 +91,7 @@ def layered(
         here = begin[space.layer[begin] == number]
         fresh = np.zeros((len(here), width), np.int64)
         fresh[:, : space.robots + 1] = here[:, None]
-        both = np.concatenate((fresh, arriving))
-        table, place = unique_rows(both)
+        table, place = unique_rows(np.concatenate((fresh, arriving)))
         yield table, place[len(here) :]
         if number:
             arriving = expand(table)

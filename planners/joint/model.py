@@ -256,8 +256,7 @@ class JointModel:
 
     def state(self, atoms: Iterable[Atom]) -> Rows:
         """The row of an initial state: the fluents among ``atoms`` (statics are left out)."""
-        names = sorted(show(a) for a in atoms if a not in self.statics)
-        return self.codec.encode(names)
+        return self.codec.encode(sorted(show(a) for a in atoms if a not in self.statics))
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state, in words."""

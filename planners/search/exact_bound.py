@@ -115,8 +115,7 @@ class ExactBound:
         for way in np.random.default_rng(0).permutation(len(ways)).tolist():
             if not passes[way]:
                 continue
-            literals = asked[way].tolist()
-            recent.append(self._unless_refuted(literals))
+            recent.append(self._unless_refuted(asked[way].tolist()))
             if not recent[-1]:
                 # What is refuted is part of other ways, too.
                 alike = np.arange(len(ways))

@@ -204,6 +204,8 @@ def checked_value(given: Option, value: Any) -> object:
     """
     if isinstance(value, Iterator):
         value = tuple(value)
+    if getattr(value, "shape", None) == ():
+        value = value.item()  # a number of numpy
     if given.values:
         if value not in given.values:
             raise UsageError(

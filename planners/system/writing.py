@@ -67,8 +67,7 @@ def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | No
             raise _cannot(path, reason)
         if is_device(path):
             remove_file(outdated)
-            with open(path, "wb") as file:
-                file.write(data)
+            Path(path).write_bytes(data)
             return
         target = Path(os.path.realpath(path))
         with postponed_signals(), _written_beside(target, data) as beside, _set_aside(outdated):

@@ -306,8 +306,7 @@ def test_names_of_files_and_the_environment(
         bare = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
         done = subprocess.run(own_process(*arguments), cwd=tmp_path, env={**os.environ, **bare})
         assert done.returncode == 0
-    found = {path.name for path in tmp_path.iterdir()}
-    assert found == {domain, problem, language, page}
+    assert {path.name for path in tmp_path.iterdir()} == {domain, problem, language, page}
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import ast
 import inspect
 import json
 import os
+import pickle
 import shlex
 import subprocess
 import sys
@@ -17,9 +18,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-import coordlang
 import coordlang as door
 from coordlang.commands.main import COMMANDS
 from coordlang.language.recorded import options_of
@@ -66,12 +67,14 @@ SENTENCE = "w0 w2 w1 w0"
 #: Functions, their arguments behind the files, and the same on the command line.
 SAME: list[tuple[str, dict[str, Any], str]] = [
     ("inspect", {"states": True}, "--states"),
+    ("plans", {"slack": np.int64(1)}, "--slack 1"),
     ("check", {}, ""),
     ("coordination", {}, ""),
     ("verify", {}, ""),
     ("say", {"plan": "plan"}, "plan"),
     ("plan", {"sentence": SENTENCE}, f"'{SENTENCE}'"),
     ("plan", {"prefer": ["first:r2", "shortest"]}, "--prefer first:r2 --prefer shortest"),
+    ("understand", {"sentence": SENTENCE}, f"'{SENTENCE}'"),
     ("choices", {"sentence": SENTENCE.split()}, f"'{SENTENCE}'"),
     ("choices", {"sentence": SENTENCE, "robot": "r2"}, f"'{SENTENCE}' --robot r2"),
     ("explain", {}, ""),
@@ -99,6 +102,7 @@ def test_a_function_answers_as_its_command(
     found = getattr(door, name)(*files, **given)
     outcome = coordlang(name, *files, *shlex.split(line), "--json")
     assert json.loads(json.dumps(found.data())) == json.loads(outcome.out)
+    assert isinstance(pickle.loads(pickle.dumps(found)) == found, bool)
     shows_itself(found)
 
 
@@ -211,6 +215,7 @@ def test_formulas_and_demands(language: Path) -> None:
 
 def test_parsed_objects_stand_for_files(language: Path) -> None:
     loaded = door.load(*T_MAP, cost="makespan+actions")
+    shows_itself(loaded)
     assert door.plans(loaded).count == door.plans(*T_MAP, cost="makespan+actions").count
     domain, problem = loaded.domain, loaded.problems[0]
     assert door.plans(domain, problem).count == 2
@@ -324,14 +329,14 @@ def python(*arguments: str, cwd: Path = ROOT) -> tuple[int, str, str]:
 
 
 def test_every_name_is_there() -> None:
-    assert set(coordlang.__all__) <= set(dir(coordlang))
+    assert set(door.__all__) <= set(dir(door))
     only_commands = {"domains", "import", "report", "robot", "schema", "tasks"}
     functions = {*COMMANDS, "load", "load_language"} - only_commands
-    assert set(coordlang.__all__) >= {*functions, "Language", "Monitor", "CoordlangError"}
-    for name in coordlang.__all__:
-        assert getattr(coordlang, name).__doc__, name
+    assert set(door.__all__) >= {*functions, "Language", "Monitor", "CoordlangError"}
+    for name in door.__all__:
+        assert getattr(door, name).__doc__, name
     with pytest.raises(AttributeError, match="has no attribute 'teach'"):
-        coordlang.teach  # noqa: B018
+        door.teach  # noqa: B018
 
 
 def test_types_are_those_of_the_lazy_names() -> None:
@@ -344,13 +349,13 @@ def test_types_are_those_of_the_lazy_names() -> None:
         for alias in node.names
         if alias.asname
     }
-    assert typed == coordlang._MODULE_OF
-    assert {*typed, "__version__"} == set(coordlang.__all__)
+    assert typed == door._MODULE_OF
+    assert {*typed, "__version__"} == set(door.__all__)
 
 
 def test_no_module_hides_a_function() -> None:
     modules = {path.stem for path in (ROOT / "coordlang").iterdir()}
-    assert not modules & set(coordlang.__all__)
+    assert not modules & set(door.__all__)
 
 
 @pytest.mark.parametrize("used", ["coordlang", "coordlang.Monitor"])
@@ -383,8 +388,8 @@ def test_build_loads_what_it_needs_only() -> None:
 
 
 def test_python_m_runs_the_command_line() -> None:
-    assert coordlang.__version__ == version("coordlang")
-    assert python("-m", "coordlang", "--version")[1].strip().endswith(coordlang.__version__)
+    assert door.__version__ == version("coordlang")
+    assert python("-m", "coordlang", "--version")[1].strip().endswith(door.__version__)
     files = ["domains/t-map/domain.pddl", "domains/t-map/problem.pddl"]
     assert python("-m", "coordlang", "plans", *files, "--count")[:2] == (0, "2\n")
     assert python("-m", "coordlang", "plans", files[0])[0] == 2

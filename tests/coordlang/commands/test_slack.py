@@ -46,8 +46,7 @@ def test_the_file_records_it_and_verify_checks_it(made: Path, shell: Shell) -> N
     sees = data["model"].get("words_see_slack", False)
     assert ("slack-left" in data["domain"]["fluents"]) == sees
     assert all(("(slack-left " in key) == sees for key in data["states"])
-    said = "all plans within slack 1 of one sentence mix freely"
-    shell(f"verify {made} SQUARE", 0, said)
+    shell(f"verify {made} SQUARE", 0, "all plans within slack 1 of one sentence mix freely")
     # Fewer words are refuted, by plans that take longer than the least makespan, too.
     data["states"] = dict.fromkeys(data["states"], data["words"][0])
     data |= {"words": data["words"][:1], "default": data["words"][0]}
@@ -107,8 +106,7 @@ def test_commands_that_follow(made: Path, sentence: str, shell: Shell) -> None:
 def test_what_refuses(shell: Shell, made: Path) -> None:
     with pytest.raises(UsageError, match="--slack"):
         library.lift(*CELLS, slack=1)
-    said = "--start does not go with --slack"
-    shell(f"build SQUARE --start {made} -o l.json", 2, said)
+    shell(f"build SQUARE --start {made} -o l.json", 2, "--start does not go with --slack")
     build = "build CELLS --slack 1 -o l.json"
     shell(f"{build} --method greedy", 2, "--method minimal")
     shell(f"{build} --words-see-slack")

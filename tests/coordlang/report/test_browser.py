@@ -246,8 +246,7 @@ def remaining(world: World, number: int) -> set[int]:
 def test_the_picture_of_the_words(open_page: Opener) -> None:
     """Every state of the language once, with its word; one word on demand; and the map's tint."""
     world = make_world("t-map", "problem")
-    opened = open_page(world.report.html)
-    page = opened.page
+    page = open_page(world.report.html).page
     for view in (1, 2):
         page.click(f"#atlas-tabs button:nth-child({view})")
         shown = page.evaluate(

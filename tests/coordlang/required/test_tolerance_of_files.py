@@ -128,8 +128,7 @@ def test_commands_warn_of_words_that_are_too_few(
         assert warning not in found.out or name == "explain"
     assert warning.removeprefix("may fail, and its file ") in page.read_text()
     assert "whatever the others choose" not in page.read_text()
-    said = library.say(path, *SQUARE, plan)
-    assert said.data().get("tolerance") == tolerance
+    assert library.say(path, *SQUARE, plan).data().get("tolerance") == tolerance
     library.load_language(path).save(path)
     assert library.load_language(path).may_fail
     if tolerance is None:

@@ -38,8 +38,7 @@ def loaded(folder: Path, texts: dict[str, str]) -> PlanningInstance:
 
 def test_columns_are_x_and_rows_are_y(tmp_path: Path) -> None:
     grid, scenario = files(tmp_path, ["0 2 2 0", "3 0 0 0", "0 0 3 0"])
-    agents = read_agents(scenario, read_map(grid), 2)
-    assert agents == (((2, 0), (0, 2)), ((0, 3), (0, 0)))
+    assert read_agents(scenario, read_map(grid), 2) == (((2, 0), (0, 2)), ((0, 3), (0, 0)))
     texts = planning_files(grid, scenario, 2)
     assert sorted(texts) == ["coordinates.json", "domain.pddl", "problem.pddl"]
     assert texts["domain.pddl"] == (DOMAINS / "grid" / "domain.pddl").read_text()
