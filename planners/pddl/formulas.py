@@ -68,8 +68,7 @@ def read_formula(names: Names, item: Expression) -> Formula:
 def _literal(names: Names, item: Group) -> Atom | StepAtom:
     if item.head in names.predicates or item.head not in names.actions:
         return _atom(names, item)
-    own = names.arguments(item, [names.actions[item.head]], "action")
-    return StepAtom(item.head, own)
+    return StepAtom(item.head, names.arguments(item, [names.actions[item.head]], "action"))
 
 
 def _parts(names: Names, item: Group, number: int | None = None) -> tuple[Formula, ...]:

@@ -251,6 +251,9 @@ def unknown(what: str, item: Group, declared: Iterable[str]) -> BadInput | Unsup
     feature = _FEATURES.get("within" if timed else item.head)
     if feature is not None:
         return item.unsupported(f"{feature.format(item.head)} is")
+    if item.head in _WORDS:
+        remedy = "Effects are atoms, (not ATOM), and, forall, when; only effects may have when."
+        return item.fail(f"'{item.head}' cannot stand here", remedy)
     return item.fail(f"unknown {what} {echoed(item.head)}", known(declared, item.head, what))
 
 

@@ -12,6 +12,7 @@ from planners.joint.conditions import split_condition, split_effects
 from planners.joint.model import FullState, Goal, JointModel, show
 from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import required_atoms
+from planners.pddl.lifted import FALSE
 
 #: What to try besides a larger limit.
 SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
@@ -89,8 +90,7 @@ def searched(model: JointModel, goal: Goal, seen: Rows, left_out: int = 0) -> st
         )
     elif len(seen) > 1:
         said = f"All {len(seen):,} reachable states were searched."
-    lacking = _lacking(model, goal)
-    if lacking:
+    if lacking := _lacking(model, goal):
         return "\n  ".join((said, *lacking))
     looked_at = model.codec.facts_part(seen[:: len(seen) // _LOOK_AT + 1])
     conflicts = Counter(model.stepper.conflicts(looked_at))
@@ -109,6 +109,8 @@ def _lacking(model: JointModel, goal: Goal) -> list[str]:
     Of robots that lack something static (a tool, perhaps as it is meant) only if an atom of the
     goal is out of reach of all.
     """
+    if goal == FALSE:
+        return ["The goal is false in every state: static facts or equalities say so."]
     atoms = () if isinstance(goal, FullState) else required_atoms(goal)
     missing = [show(atom) for atom in atoms if atom not in model.codec.facts]
     said = [f"The goal needs {atom}, and nothing makes it true." for atom in missing[:1]]

@@ -274,10 +274,11 @@ CASES: dict[str, Case] = {
     "shadowing in the goal": case(
         1, DOMAIN, goal("(exists (?x - room) (and (at r1 ?x) (exists (?x - room) (at r2 ?x))))")
     ),
-    "a goal that no action changes": case((11, "cannot be reached"), DOMAIN, goal("(door a c)")),
+    "a goal that no action changes": case((11, "is false in every"), DOMAIN, goal("(door a c)")),
     "an action in the goal": case(
         (31, "p.pddl:4:10: unknown predicate 'go'"), DOMAIN, goal("(go r1 a b)")
     ),
+    "or in an effect": case((31, "'or' cannot stand here"), d(EFFECT, "(or (at ?r ?y))")),
     "two goals": case(
         (31, "expected one '(:goal FORMULA)'"), DOMAIN, goal("(at r1 c)) (:goal (at r2 a)")
     ),
