@@ -259,11 +259,13 @@ def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
 
 def read_language(language: given.LanguageSource) -> tuple[Language | LiftedLanguage, Position]:
     """Read a language or a lifted language, with what messages call it."""
-    from coordlang.language.file import language_from_bytes
+    from coordlang.language.file import faults_of_words, language_from_bytes, refuse_first
     from coordlang.language.words import Language
 
     if isinstance(language, Language):
-        return language, Position("the language")
+        position = Position("the language")
+        refuse_first(faults_of_words(language), position)
+        return language, position
     if not isinstance(language, str | PathLike):
         return language, Position("the lifted language")
     data, position = read_bytes(fspath(language)), Position(fspath(language))

@@ -19,6 +19,7 @@ from planners.system.errors import UsageError
 from planners.system.options import cli_option, group, option
 
 if TYPE_CHECKING:
+    from coordlang.commands.sentences import PlanUnderSentence
     from coordlang.language.listed import ListedTask
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
@@ -44,7 +45,7 @@ ARGUMENTS: Mapping[str, Any] = {
     "PROBLEMS...": ProblemSource,
     "LANGUAGE": LanguageSource,
     "LIFTED": Union[File, "LiftedLanguage"],
-    "PLAN": File | Sequence[Sequence[str | None]],
+    "PLAN": Union[File, Sequence[Sequence[str | None]], "PlanUnderSentence"],
     "SENTENCE": SentenceSource,
     "FILES...": File,
 }

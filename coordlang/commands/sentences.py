@@ -70,7 +70,7 @@ def say(files: Arguments, options: SayOptions) -> Said:
     plan = files.needed("PLAN")
     used = files.task().used
     is_file = isinstance(plan, str | PathLike)
-    plans = read_plans(fspath(plan), used.model.in_step) if is_file else [plan]
+    plans = read_plans(fspath(plan), used.model.in_step) if is_file else [tuple(plan)]
     sentences = []
     for number, steps in enumerate(plans, 1):
         try:

@@ -217,8 +217,7 @@ def walk_mixtures(
         if len(broken):
             last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
             return None, _witness(task_language, fits, words, steps, *last), walked
-        reached = np.column_stack((after, space.targets(edge)))
-        table, number = unique_rows(reached)
+        table, number = unique_rows(np.column_stack((after, space.targets(edge))))
         steps.append((source, edge, number))
         layers.append(table[:, robots])
         walked += len(table)

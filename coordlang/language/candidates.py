@@ -268,8 +268,7 @@ def _one_by_one(
     skipped: list[str] = []
     for number, (text, task) in enumerate(zip(listed, tasks, strict=True)):
         try:
-            shared = plans if kind == "file" else {}
-            spaces.append(_search_once(loaded.model, task, shared))
+            spaces.append(_search_once(loaded.model, task, plans if kind == "file" else {}))
             kept.append(text)
         except ProvedImpossible as error:
             if skip_unsolvable and len(skipped) < len(tasks) - 1:

@@ -244,7 +244,7 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
             remedy="Build the language again, without --overlap.",
         )
     refuse_duplicates(data, position)
-    refuse_first(_faults_of_words(record), position)
+    refuse_first(faults_of_words(record), position)
     _check_seen(record, position)
     refuse_first(_faults(record), position)
     tasks = TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks
@@ -317,7 +317,8 @@ def _faults(record: LanguageRecord) -> Iterator[Fault]:
         yield f"{what} ('tolerance')", remedy
 
 
-def _faults_of_words(record: LanguageRecord) -> Iterator[Fault]:
+def faults_of_words(record: LanguageRecord | Language) -> Iterator[Fault]:
+    """Words that are none or not different, and what is given as a word and is not among them."""
     words = set(record.words)
     if len(words) < len(record.words) or not words:
         yield "the words must be different, and at least one", _BUILD_AGAIN

@@ -119,8 +119,7 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
 
 def solvable(space: Space, tasks: Sequence[tuple[Goal, Rows]]) -> list[tuple[Goal, Rows]]:
     """Leave out the tasks whose goal cannot be reached; goals with tables of initial states."""
-    far = distances_to(space, [goal for goal, _ in tasks])
-    pairs = zip(tasks, far, strict=True)
+    pairs = zip(tasks, distances_to(space, [goal for goal, _ in tasks]), strict=True)
     found = [(goal, inits[own[space.numbers(inits)] >= 0]) for (goal, inits), own in pairs]
     return [(goal, inits) for goal, inits in found if len(inits)]
 

@@ -67,8 +67,7 @@ class FixedPlans:
         There are plans.
         """
         self.close()
-        runs = np.tile(self._sizes, self.steps)
-        labels = ranges(self.first.reshape(-1), runs)
+        labels = ranges(self.first.reshape(-1), np.tile(self._sizes, self.steps))
         literals = flat_clauses(simplified(self.clauses, labels.tolist()))
         # Labels get the first numbers, then the other variables in the order in which they occur.
         known, at = np.unique(np.append(labels, np.abs(literals[literals != 0])), return_index=True)

@@ -32,9 +32,8 @@ def built(text: RandomModel, cost: str = "makespan") -> PlanningInstance:
     return model_of(text.domain, text.problem, options)
 
 
-def twin_of(loaded: PlanningInstance, text: RandomModel) -> Twin:
-    domain, (problem,) = loaded.domain, loaded.problems
-    return Twin(domain, problem, loaded.team, _MOST_TRIES)
+def twin_of(loaded: PlanningInstance) -> Twin:
+    return Twin(loaded.domain, loaded.problems[0], loaded.team, _MOST_TRIES)
 
 
 def _key(state: State) -> list[str]:
@@ -56,7 +55,7 @@ def _fast_steps(
 
 def check_model(text: RandomModel, note: Callable[[str], None]) -> None:
     loaded = built(text)
-    twin = twin_of(loaded, text)
+    twin = twin_of(loaded)
     try:
         states = twin.reachable(_MOST_STATES)
     except TooLarge:

@@ -151,6 +151,8 @@ def test_build_and_verify(language: Path, tmp_path: Path) -> None:
     miscounted = replace(loaded.provenance, tasks={"kind": "problems", "count": 2})
     with pytest.raises(door.BadInput, match="records 2 tasks but lists 0"):
         door.verify(replace(loaded, provenance=miscounted), *T_MAP)
+    with pytest.raises(door.BadInput, match=r"'w9' \(of 'default'\) is not among the words"):
+        door.verify(replace(loaded, default="w9"), *T_MAP)
     silent = replace(loaded, states=dict.fromkeys(loaded.states, "w0"))
     found = door.verify(silent, *T_MAP)
     assert not found
@@ -224,6 +226,7 @@ def test_parsed_objects_stand_for_files(language: Path) -> None:
     assert door.verify(built.language, loaded)
     assert door.say(built.language, loaded, None, door.plans(loaded)[0]).covered
     assert door.verify(language, domain, problem)
+    assert door.say(language, *T_MAP, door.plan(language, *T_MAP, SENTENCE)).sentence == SENTENCE
     read = door.load_language(language)
     assert door.verify(door.Language(read.words, read.states, read.default), domain, problem)
     with pytest.raises(door.UsageError, match="no problem to learn from"):

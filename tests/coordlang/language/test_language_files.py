@@ -99,8 +99,7 @@ def test_a_task_that_is_there_twice_counts_once(coordlang: Command, tmp_path: Pa
         assert (repeated in outcome.err) == (number == 1)
         means.append(library.load_language(output).tolerance)
         edit(output, tasks={"kind": "file", "count": len(tasks), "tasks": tasks})
-        verified = coordlang("verify", output, *T_MAP, "--json")
-        assert json.loads(verified.out)["tasks"] == 2
+        assert json.loads(coordlang("verify", output, *T_MAP, "--json").out)["tasks"] == 2
     found, other = means
     assert found is not None
     assert found.failure_mean is not None

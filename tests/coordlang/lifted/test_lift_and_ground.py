@@ -246,8 +246,7 @@ def test_coordinates_given_as_objects() -> None:
 def test_coordinates_that_are_missing(rings: Lifted, tmp_path: Path) -> None:
     """Places without telling names: who is refuted is told what may be missing."""
     problem = tmp_path / "p.pddl"
-    text = RINGS[0].read_text()
-    problem.write_text(text.replace("c0-", "upper").replace("c1-", "lower"))
+    problem.write_text(RINGS[0].read_text().replace("c0-", "upper").replace("c1-", "lower"))
     with pytest.raises(Refuted, match=r"are they known here \(--coordinates\)\?"):
         api.ground(rings.language, GRID, problem, jobs=1)
     points = {f"{row}{x}": (x, y) for y, row in enumerate(("upper", "lower")) for x in range(4)}

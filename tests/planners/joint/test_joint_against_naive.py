@@ -110,7 +110,7 @@ def test_an_action_that_is_idling_is_left_out(more: str, is_left_out: bool) -> N
     expected = {"wait"} if is_left_out else set()
     assert any("wait" in label for own in loaded.model.labels for label in own) != is_left_out
     assert idling_schemas(loaded.domain) == expected
-    rules = twin_of(loaded, text).rules
+    rules = twin_of(loaded).rules
     assert {s.name for s in loaded.domain.schemas if rules.is_idling(s)} == expected
     check_model(text, note=lambda _: None)
 
