@@ -289,7 +289,7 @@ def read_header(root: Group, kind: str) -> tuple[str, Sections]:
         other = title.head if isinstance(title, Group) else ""
         remedy = f"As in (define ({kind} NAME) ..)."
         if {kind, other} == {"domain", "problem"}:
-            remedy = f"This is a {other} file: the order is DOMAIN PROBLEM."
+            remedy = f"This is a {other} file: the order is [LANGUAGE] DOMAIN PROBLEM."
         raise title.fail(f"expected '({kind} NAME)' after 'define'", remedy)
     sections: Sections = {}
     for item in root.items[2:]:

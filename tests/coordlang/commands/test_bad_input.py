@@ -64,7 +64,7 @@ WRONG = [
     ),
     (("(" * 10_000, PROBLEM), "nested more than 200 deep"),
     (("", PROBLEM), "expected '(define ...', found an empty file\n  Give a PDDL file"),
-    ((PROBLEM, PROBLEM), "This is a problem file: the order is DOMAIN PROBLEM."),
+    ((PROBLEM, PROBLEM), "This is a problem file: the order is [LANGUAGE] DOMAIN PROBLEM."),
     # domains
     (
         d("(at ?r ?y) (not", "(at ?y ?r) (not"),
