@@ -63,6 +63,8 @@ def _run(interruptions: Interruptions) -> int:
     from coordlang.commands.terminal import flush_stdout, whatever_stderr
 
     sys.stderr = whatever_stderr()
+    if (out := sys.stdout) is not None:  # without a buffer (-u) what one write leaves is lost
+        sys.stdout = os.fdopen(1, "w", encoding=out.encoding, errors=out.errors, closefd=False)
     code = run(sys.argv[1:], interruptions)
     flush_stdout()
     return code

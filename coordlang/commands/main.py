@@ -138,9 +138,7 @@ def _run(arguments: list[str], output: dict[str, bool]) -> int:
             )
         sys.stdout.flush()
         return result if isinstance(result, int) else 0
-    except BrokenPipeError:
-        # The reader has gone (`| head`): no more output, and no complaint at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # the reader has gone (`| head`)
         return BROKEN_PIPE
     except SystemExit as end:
         if "_COORDLANG_COMPLETE" in os.environ:  # so ends click what a shell asks it

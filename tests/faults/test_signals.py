@@ -27,7 +27,7 @@ from planners.system.limits import time_left, time_limit
 from planners.system.signals import ENDING, Interrupted, Interruptions, postponed_signals
 from planners.system.writing import write_atomically
 from tests.support.command import in_shell, own_process
-from tests.support.domains import DOMAINS, ROOT
+from tests.support.domains import DOMAINS, ROOT, files_of
 from tests.support.forks import fork, fork_command
 
 FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
@@ -237,6 +237,7 @@ def test_no_solver_is_left_by_longjmp(solver: str, monkeypatch: pytest.MonkeyPat
 CELLS = [str(DOMAINS / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
 COUNT = ("plans", *CELLS, "--count")
 BUILD = ("build", *CELLS, "--method", "minimal", "-o", "-")
+MANY = ("plans", *map(str, files_of("grid", "corners-5x5")), "--max", "1000")
 
 
 @pytest.mark.parametrize(
@@ -248,6 +249,7 @@ BUILD = ("build", *CELLS, "--method", "minimal", "-o", "-")
         (">/dev/full 2>/dev/full", COUNT, 2, ""),
         ("2>/dev/full >/dev/null", BUILD, 0, ""),  # an answer needs no stderr
         (">/dev/full", COUNT, 2, "coordlang: the output cannot be written"),
+        ("| (read -n 1)", MANY, 141, ""),  # it goes in the middle of a write
         (">&-", COUNT, 2, "coordlang: stdout is closed"),
         (">&-", BUILD, 2, "coordlang: stdout is closed"),
         ("<&-", ("plans", "-", CELLS[1]), 31, "coordlang: -: cannot be read: stdin is closed"),
@@ -257,7 +259,7 @@ BUILD = ("build", *CELLS, "--method", "minimal", "-o", "-")
 def test_streams_that_are_closed_or_full(
     redirection: str, arguments: tuple[str, ...], code: int, said: str
 ) -> None:
-    done = in_shell(f"exec COORDLANG {redirection}", *arguments)
+    done = in_shell(f"PYTHONUNBUFFERED=1 exec COORDLANG {redirection}", *arguments)
     assert (done.returncode, done.stdout) == (code, "")
     assert done.stderr.startswith(said)
     assert bool(done.stderr) == bool(said)
@@ -271,14 +273,11 @@ def test_the_working_directory_is_removed(tmp_path: Path) -> None:
     assert "cannot be written: the working directory has been removed" in refused.stderr
 
 
-UNICODE = "ünïcödé"
-
-
 @pytest.mark.parametrize(
     ("name", "changes"),
     [
         *((name, None) for name in ("two words", "two\nlines", "-o", "--help", "'\"$(x)`*")),
-        *((UNICODE, new) for new in ({}, {"HOME": None}, {"HOME": "/no/home"}, {"TMPDIR": "/no"})),
+        *(("ünïcö", new) for new in ({}, {"HOME": None}, {"HOME": "/no/home"}, {"TMPDIR": "/no"})),
     ],
 )
 def test_names_of_files_and_the_environment(
@@ -306,7 +305,7 @@ def test_names_of_files_and_the_environment(
         bare = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
         done = subprocess.run(own_process(*arguments), cwd=tmp_path, env={**os.environ, **bare})
         assert done.returncode == 0
-    assert {path.name for path in tmp_path.iterdir()} == {domain, problem, language, page}
+    assert {*os.listdir(tmp_path)} == {domain, problem, language, page}
 
 
 @pytest.mark.parametrize(
