@@ -6,7 +6,6 @@ from __future__ import annotations
 import errno
 import gzip
 import os
-import shutil
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -118,23 +117,24 @@ def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
             into.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(prefix=".coordlang.", dir=into) as beside:
                 for folder in map(Path, folders):
-                    shutil.copytree(folder, Path(beside, folder.name), copy_function=_copy_file)
+                    copy = Path(beside, folder.name)
+                    copy.mkdir()
+                    for file in folder.iterdir():
+                        _copy_file(file, copy / file.name)
                 with ExitStack() as undone:
                     for folder in map(Path, folders):
                         copy, place = Path(beside, folder.name), into / folder.name
                         os.rename(copy, place)
                         undone.callback(os.rename, place, copy)
                     undone.pop_all()
-    except shutil.Error as error:  # of many files; the first says why
-        raise _cannot(into, error.args[0][0][2]) from None
     except OSError as error:
         raise _cannot(into, error.strerror or str(error)) from None
 
 
-def _copy_file(source: str, copy: str) -> None:
+def _copy_file(source: Path, copy: Path) -> None:
     """Write a file again, to the disk."""
     with open(copy, "wb") as file:
-        file.write(Path(source).read_bytes())
+        file.write(source.read_bytes())
         file.flush()
         os.fsync(file.fileno())
 
