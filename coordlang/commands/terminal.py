@@ -125,7 +125,7 @@ def ended_early(stopped: BaseException | None, what: str, kept: str = "") -> int
     if isinstance(stopped, KeyboardInterrupt):
         tell(f"interrupted; {what}")
         return SIGNALS + stopped.number if isinstance(stopped, Interrupted) else INTERRUPTED
-    reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
+    reason = "out of memory" if isinstance(stopped, MemoryError) else str(stopped).splitlines()[0]
     tell(f"{reason}{kept}; {what}")
     return UNPROVED
 

@@ -306,8 +306,9 @@ def test_a_limit_ends_the_search_for_fewer_words(
     coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The words that are verified already are written: exit code 3; 130 after an interrupt."""
-    late = api.OutOfTime("the time limit is over")
-    for error, code in ((late, 3), (MemoryError(), 3), (KeyboardInterrupt(), 130)):
+    late, full = api.OutOfTime("time is over"), MemoryError("of an array")
+    reasons = ((late, 3, late), (full, 3, "out of memory"), (KeyboardInterrupt(), 130, ""))
+    for error, code, reason in reasons:
         stop = Mock(side_effect=error)
         monkeypatch.setattr("coordlang.lifted.learning.merge_classes", stop)
         path = tmp_path / f"{code}.json"
@@ -315,5 +316,5 @@ def test_a_limit_ends_the_search_for_fewer_words(
             "lift", GRID, SMALL, "--tasks", "all", "--prefer", "features", "-o", path, "--jobs", 1
         )
         assert outcome.code == code
-        assert "the best words so far are written: they are verified" in outcome.err
+        assert f"{reason}; the best words so far are written: they are verified" in outcome.err
         assert len(json.loads(path.read_text())["words"]) > 1
