@@ -40,6 +40,8 @@ _RANDOM_WAYS = 40
 _KEPT = 1_000_000
 #: Steps of mixtures that are looked at for each tuple that is wanted, once there is one.
 _EFFORT = 5
+#: Links of a walk, for each task: they take a second (corners of 10x10 have up to 26 million).
+_LINKS = 1_000_000
 #: What each robot can still do and say: words that others have not said yet, and a set.
 _Ahead = tuple[tuple[Words, int], ...]
 #: A step that a robot can make: its label, its code, where the robot is then, and all sentences of
@@ -320,15 +322,28 @@ class _Layer:
 
 
 class CounterexampleWalk:
-    """Finds failing tuples of two robots' plans, of their choices, that have one sentence."""
+    """Finds failing tuples of two robots' plans, of their choices, that have one sentence.
 
-    def __init__(self, choices: Choices) -> None:
+    Once a walk had more ``links`` for each task, sets are followed.
+    """
+
+    def __init__(self, choices: Choices, links: int = _LINKS) -> None:
         self._choices, self._space = choices, choices.space
         self._index = EdgeIndex.of(choices.space)
+        self._links = links * len(choices.space.starts)
+        self._sets: Mixtures | None = None
 
     def failing(self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize) -> list[Ints]:
-        """See `Mixtures.failing`: the fewest differences, and drawn ones, whatever ``steps``."""
-        layers, most = self._layers(word), max(most, _LEAST)
+        """See `Mixtures.failing`: by a walk the fewest differences, whatever ``steps``."""
+        if self._sets is None:
+            try:
+                return self._by_walk(word, max(most, _LEAST), ways)
+            except Undecided:
+                self._sets = Mixtures(self._choices)
+        return self._sets.failing(word, most, ways, steps)
+
+    def _by_walk(self, word: Ints, most: int, ways: int) -> list[Ints]:
+        layers = self._layers(word)
         # Columns: fewest steps at which the plans differ, steps to go, row of the layer.
         starts = [np.zeros((0, 3), np.int64)]
         for number, layer in enumerate(layers, 1):
@@ -353,14 +368,18 @@ class CounterexampleWalk:
         return found
 
     def _layers(self, word: Ints) -> list[_Layer]:
-        """The nodes from which some mixture can fail and the plans' sentences can agree."""
-        space = self._space
+        """The nodes from which some mixture can fail and the plans' sentences can agree.
+
+        Raises `Undecided` where they have too many links.
+        """
+        space, left = self._space, self._links
         before, after = word[space.sources], word[space.targets()]
         #: (edges): the word that a plan enters, `_NO_WORD` where it goes on in its word.
         entered = np.where(before == after, _NO_WORD, after)
         leads, links = _Leads(), list[Ints]()
 
         def expand(nodes: Ints) -> Ints:
+            nonlocal left
             # Columns: the node, the edges of the plans, the node that they lead to.
             found = [np.zeros((0, 7), np.int64)]
             for source, edges, targets in moves(space, self._index, nodes[:, :3]):
@@ -368,6 +387,9 @@ class CounterexampleWalk:
                 rows = np.column_stack((source, edges, targets, lead))
                 rows = rows[lead != _PARTED]
                 found.append(rows[can_fail(self._choices, rows[:, 3:6])])
+                left -= len(lead)
+                if left < 0:
+                    raise Undecided
             together = np.concatenate(found)
             links.append(together[:, :3])
             return together[:, 3:]
