@@ -63,9 +63,8 @@ class _Search(LocalSearch):
         """The best language, with what is known of it."""
         figures: dict[str, float] = {**self._found.figures, "moves": self.moves}
         figures["improvements"] = self._improvements
-        if not isinstance(stopped, OutOfMemory):  # it would be for as long again
-            with suppress(OutOfMemory):
-                figures |= self._measures()
+        with suppress(OutOfMemory):
+            figures |= self._measures()
         return replace(self._found, partition=self.partition, figures=figures, stopped=stopped)
 
     def _measures(self) -> dict[str, float]:
