@@ -8,9 +8,11 @@ downwards.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from itertools import product
+
+from msgspec.structs import replace
 
 from planners.pddl.lifted import (
     And,

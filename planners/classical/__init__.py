@@ -19,7 +19,6 @@ effects are worked out anew here.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 from planners.classical.selection import select_then_apply
 from planners.classical.selectors import Selectors, in_step, selectors_of
@@ -126,7 +125,7 @@ def _cases_of(team: Selectors, step: Sequence[int]) -> Iterator[tuple[Known, lis
     chosen = {action.name for action in actions}
     wanted = joined(And, [in_step(action.precondition, chosen) for action in actions])
     effects = [
-        replace(effect, condition=in_step(effect.condition, chosen))
+        Effect(effect.atom, effect.adds, in_step(effect.condition, chosen))
         for action in actions
         for effect in action.effects
     ]

@@ -19,7 +19,7 @@ from planners.pddl.formula_tree import (
     negated,
     substituted,
 )
-from planners.pddl.lifted import FALSE, And, Atom, Equal, Formula, StepAtom, Truth
+from planners.pddl.lifted import FALSE, And, Atom, Effect, Equal, Formula, StepAtom, Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def _on_facts(action: GroundAction, model: JointModel) -> GroundAction:
     """An action whose formulas and effects are over facts of the model, with its second cost."""
     reader, facts = state_reader(model), model.codec.facts
     effects = [
-        replace(effect, condition=substituted(effect.condition, reader))
+        Effect(effect.atom, effect.adds, substituted(effect.condition, reader))
         for effect in action.effects
         if effect.atom in facts
     ]

@@ -225,7 +225,7 @@ def _one(place: Expression, own: Variable, listed: Variable) -> Variable:
         here, there = (" or ".join(types) for types in given)
         what = f"{own.name} is of type {here} behind :agent, but {there} among the :parameters"
         raise place.fail(what, f"Write ({own.name} - {here} ..) there.")
-    return replace(own, types=given[0]) if given else own
+    return Variable(own.name, given[0]) if given else own
 
 
 _Items = tuple[Expression, ...]

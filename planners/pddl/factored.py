@@ -9,10 +9,12 @@ the action's ``:agent``.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from operator import or_
 from pathlib import Path
 from typing import Any, TypeVar
+
+from msgspec import structs
 
 from planners.pddl.domain import parse_domains
 from planners.pddl.formula_tree import label
@@ -166,7 +168,9 @@ def _agent_of(schema: Schema) -> tuple[str, ...]:
 
 
 def _with_types(schema: Schema, types: tuple[str, ...]) -> Schema:
-    parameters = (replace(p, types=types) if p == schema.acting else p for p in schema.parameters)
+    parameters = (
+        structs.replace(p, types=types) if p == schema.acting else p for p in schema.parameters
+    )
     return replace(schema, parameters=tuple(parameters))
 
 
@@ -186,9 +190,8 @@ def _numbered(part: Any, scope: tuple[str, ...]) -> Any:
         return tuple(_numbered(inner, scope) for inner in part)
     if isinstance(part, Quantified | Effect):
         scope += tuple(variable.name for variable in part.variables)
-    if is_dataclass(part) and not isinstance(part, type):
-        own = {field.name: getattr(part, field.name) for field in fields(part)}
-        return replace(part, **{name: _numbered(inner, scope) for name, inner in own.items()})
+    if own := getattr(type(part), "__match_args__", ()):  # the fields of a record
+        return type(part)(*(_numbered(getattr(part, name), scope) for name in own))
     # No token has a blank: a variable may be called "?0".
     return {name: f"? {number}" for number, name in enumerate(scope)}.get(part, part)
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from msgspec import Struct
+
 from planners.pddl.sexpr import Source
 from planners.system.errors import Position
 
@@ -18,89 +20,77 @@ Signatures = dict[str, dict[int, tuple[frozenset[str], ...]]]
 Term = str
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
+class _Node(Struct, frozen=True, cache_hash=True, gc=False):
+    """A part of a formula: grounding makes many, and asks each for its hash again and again."""
+
+
+class Variable(_Node, frozen=True):
     """A typed variable; ``types`` are alternatives, as in ``(either a b)``."""
 
     name: str
     types: tuple[str, ...] = ("object",)
 
 
-@dataclass(frozen=True, slots=True)
-class Truth:
+class Truth(_Node, frozen=True):
     """Truth or falsity."""
 
     value: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Atom:
+class Atom(_Node, frozen=True):
     """An atom over states: ``(predicate args)``."""
 
     predicate: str
     args: tuple[Term, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class StepAtom:
+class StepAtom(_Node, frozen=True):
     """An action as a literal: "this subaction is part of the same joint step" (Kovacs 2012)."""
 
     action: str
     args: tuple[Term, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Equal:
+class Equal(_Node, frozen=True):
     """Equality of two terms."""
 
     left: Term
     right: Term
 
 
-@dataclass(frozen=True, slots=True)
-class Not:
+class Not(_Node, frozen=True):
     """Negation."""
 
     part: Formula
 
 
-@dataclass(frozen=True, slots=True)
-class Junction:
+class Junction(_Node, frozen=True):
     """A conjunction or disjunction of some parts."""
 
     parts: tuple[Formula, ...]
 
 
-class And(Junction):
+class And(Junction, frozen=True):
     """Conjunction; true without parts."""
 
-    __slots__ = ()
 
-
-class Or(Junction):
+class Or(Junction, frozen=True):
     """Disjunction; false without parts."""
 
-    __slots__ = ()
 
-
-@dataclass(frozen=True, slots=True)
-class Quantified:
+class Quantified(_Node, frozen=True):
     """A formula for all or for some values of typed variables."""
 
     variables: tuple[Variable, ...]
     part: Formula
 
 
-class Forall(Quantified):
+class Forall(Quantified, frozen=True):
     """Universal quantification."""
 
-    __slots__ = ()
 
-
-class Exists(Quantified):
+class Exists(Quantified, frozen=True):
     """Existential quantification."""
-
-    __slots__ = ()
 
 
 Formula = Truth | Atom | StepAtom | Equal | Not | And | Or | Forall | Exists
@@ -108,8 +98,7 @@ TRUE = Truth(True)
 FALSE = Truth(False)
 
 
-@dataclass(frozen=True, slots=True)
-class Effect:
+class Effect(_Node, frozen=True):
     """``atom`` becomes true (``adds``) or false if ``condition`` holds before the step.
 
     Nested ``forall`` and ``when`` are flattened: ``variables`` lists every enclosing universal

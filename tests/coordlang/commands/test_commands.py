@@ -181,7 +181,7 @@ def test_plans_of_small_tasks_load_little() -> None:
         "from coordlang.__main__ import main\n"
         "try: main()\n"
         "finally: print([m for m in ('psutil', 'numpy.ma', 'pysat', 'networkx', 'scipy', 'rich', "
-        "'zipfile', 'matplotlib', 'msgspec', 'coordlang.language.candidates', "
+        "'zipfile', 'matplotlib', 'coordlang.language.candidates', "
         "'planners.parallel', 'planners.pddl.factored', 'planners.search.asynchronous', "
         "'planners.search.exact_bound', 'planners.system.writing') if m in sys.modules], "
         "len(os.listdir('/proc/self/task')), file=sys.stderr)"
