@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +24,6 @@ from coordlang.vocabulary.local_search import WORK, LocalSearch
 from planners.joint.tables import Floats, Ints
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
-from planners.system.errors import OutOfMemory
 from planners.system.limits import run_until_stopped
 
 #: Differences that are due to rounding.
@@ -55,6 +53,9 @@ class _Search(LocalSearch):
         super().__init__(job, found.size)
         self._found = found
         self.partition: Assignment = found.partition
+        #: How many plans ``found`` leaves open, and how many ``partition``; None: not measured.
+        self._before: Flexibility | None = None
+        self._after: Flexibility | None = None
         self._bound: float | None = None
         self._pending = False
         self._improvements = 0
@@ -63,12 +64,11 @@ class _Search(LocalSearch):
         """The best language, with what is known of it."""
         figures: dict[str, float] = {**self._found.figures, "moves": self.moves}
         figures["improvements"] = self._improvements
-        with suppress(OutOfMemory):
-            figures |= self._measures()
+        if self._before is not None and self._after is not None:
+            figures |= self._measures(self._before, self._after)
         return replace(self._found, partition=self.partition, figures=figures, stopped=stopped)
 
-    def _measures(self) -> dict[str, float]:
-        before, after = self._measured(self._found.partition), self._measured(self.partition)
+    def _measures(self, before: Flexibility, after: Flexibility) -> dict[str, float]:
         if after.value < before.value:  # of many plans some were measured, and misled the search
             after, self.partition = before, self._found.partition
         bound = sum(min(plans, MANY) for plans in after.plans) / len(after.plans)
@@ -87,6 +87,7 @@ class _Search(LocalSearch):
         """Search until the bound is reached, or it does not pay any more."""
         job = self._job
         spaces, states = job.candidates.spaces, len(job.candidates.rows)
+        self._before = self._after = self._measured(self.partition)
         self._bound = float(flexibility_bounds(spaces).mean())
         if self._words < 2 or self._is_met:
             return
@@ -112,14 +113,16 @@ class _Search(LocalSearch):
         if self._pending:
             partition = self._job.partition(self.best_word)
             self._job.check(partition)
-            self.partition, self._pending = partition, False
+            self._after, self.partition = self._measured(partition), partition
+            self._pending = False
             self._improvements += 1
         return self._is_met
 
     @property
     def _is_met(self) -> bool:
         assert self._bound is not None
-        return self._measured(self.partition).value >= self._bound * (1 - _ROUNDING)
+        assert self._after is not None
+        return self._after.value >= self._bound * (1 - _ROUNDING)
 
     def _measured(self, partition: Assignment) -> Flexibility:
         job = self._job
