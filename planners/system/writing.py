@@ -61,16 +61,27 @@ def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | No
     so that it never stands beside the new one, and kept if the writing fails.  Raises `UsageError`
     for a file that cannot be written, and `BrokenPipeError` for a pipe whose reader has gone.
     """
+    _write({path: data}, outdated)
+
+
+def _write(files: Mapping[str | Path, bytes], outdated: str | Path | None = None) -> None:
+    """Write files as `write_atomically` does, all of them before the first one is renamed."""
+    path: str | Path = ""
     try:
-        if reason := why_unwritable(path):
-            raise _cannot(path, reason)
-        if is_device(path):
+        for path in files:
+            if reason := why_unwritable(path):
+                raise _cannot(path, reason)
+        for path in (devices := [*filter(is_device, files)]):
             remove_file(outdated)
-            Path(path).write_bytes(data)
-            return
-        target = Path(os.path.realpath(path))
-        with postponed_signals(), _written_beside(target, data) as beside, _set_aside(outdated):
-            os.replace(beside, target)
+            Path(path).write_bytes(files[path])
+        with postponed_signals(), ExitStack() as written:
+            beside: dict[Path, Path] = {}
+            for path in (path for path in files if path not in devices):
+                target = Path(os.path.realpath(path))
+                beside[target] = written.enter_context(_written_beside(target, files[path]))
+            written.enter_context(_set_aside(outdated))
+            for target, new in beside.items():
+                os.replace(new, target)
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -99,10 +110,9 @@ def made_folder(path: str | PathLike[str], mode: int = 0o777) -> Path:
 
 
 def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
-    """Write text files, by their names, into a folder; raises `UsageError` where that fails."""
+    """Write text files, by their names, into a folder: all or, raising `UsageError`, none."""
     place = made_folder(folder)
-    for name, text in texts.items():
-        write_atomically(place / name, text.encode())
+    _write({place / name: text.encode() for name, text in texts.items()})
 
 
 def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:

@@ -158,7 +158,7 @@ def ends(
     name: str, said: dict[str, list[str]], folder: Path, faults: Iterator[Fault]
 ) -> Iterator[int]:
     """The exit code of a command on old outputs under each fault; everything else is checked."""
-    whole = Stage(name, folder / "whole", said).succeeds()
+    whole, mixed = Stage(name, folder / "whole", said).succeeds(), 0
     for number, fault in enumerate(faults):
         stage = Stage(name, folder / f"{number}", said)
         for output in stage.names:
@@ -180,6 +180,8 @@ def ends(
             else:
                 assert [*found] == stage.names
                 assert OLD in found.values() or not found
+                mixed += len({*found.values()}) > 1
+                assert mixed <= 1, "not only where the second rename fails"
         yield ended.code
 
 
