@@ -98,17 +98,19 @@ class Limits:
 
 
 @dataclass_transform(frozen_default=True)
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class CommandOptions:
     """What a command can be asked for; the docstring of each record is the command's ``--help``.
 
-    Each record that is made of this one is a frozen dataclass, too.  The command ``takes``
-    arguments as the usage line shows them, and none where the option ``alone`` is given.
-    A terminal shows what it is ``doing``.  Its ``name`` is the record's; its ``function`` has that
-    name and is in the ``module`` of that name, unless others are named, and searches no task again
-    that was searched before if it ``keeps_plans``.  Its help begins with the options that are
-    ``used`` most, by name, and ends with an ``example``, in which names in braces are files
-    (`coordlang.commands.command`).
+    Each record that is made of this one is a frozen dataclass, too (`record_from` makes it, with
+    all its groups); they share one ``__init__``, as to write one for each delays every start.
+
+    The command ``takes`` arguments as the usage line shows them, and none where the option
+    ``alone`` is given.  A terminal shows what it is ``doing``.  Its ``name`` is the record's; its
+    ``function`` has that name and is in the ``module`` of that name, unless others are named, and
+    searches no task again that was searched before if it ``keeps_plans``.  Its help begins with the
+    options that are ``used`` most, by name, and ends with an ``example``, in which names in braces
+    are files (`coordlang.commands.command`).
     """
 
     takes: ClassVar[str] = ""
@@ -128,7 +130,14 @@ class CommandOptions:
         own = cls.__name__.removesuffix("Options").lower()
         for key in {"name", "module", "function"} - vars(cls).keys():
             setattr(cls, key, own)
-        dataclass(frozen=True, eq=False, repr=False)(cls)
+        dataclass(frozen=True, init=False, eq=False, repr=False)(cls)
+
+    def __init__(self, **given: Any) -> None:
+        vars(self).update(given)
+        self.__post_init__()
+
+    def __post_init__(self) -> None:
+        """Refuse values that no command takes."""
 
 
 def output_option(help: str, metavar: str = "FILE", default: Any = None, **more: Any) -> Any:
