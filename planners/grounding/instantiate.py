@@ -43,8 +43,8 @@ from planners.system.limits import reaching
 Binding = dict[str, str]
 #: An atom without which an instance of a quantified part is no matter.
 Guard = Atom | StepAtom
-#: The variables in a quantified formula, and its guards (`_Grounder._shape_of`).
-_Shape = tuple[tuple[str, ...], tuple[Atom, ...], tuple[StepAtom, ...]]
+#: The variables in a quantified formula, its guards, and the signs of its step atoms.
+_Shape = tuple[tuple[str, ...], tuple[Atom, ...], tuple[StepAtom, ...], set[bool]]
 #: From this many values for the variables on, only subactions that are ever possible are tried.
 _MANY = 1000
 
@@ -205,7 +205,9 @@ class _Grounder:
     def _quantifier(
         self, f: Forall | Exists, binding: Binding, positive: bool, acting: tuple[int, ...]
     ) -> Formula:
-        names, statics, steps = self._shape(f)
+        names, statics, steps, signs = self._shape(f)
+        if (not positive) not in signs:
+            acting = ()  # no negative step atom asks
         key = f, positive, acting, *map(binding.get, names)
         found = self._quantified.get(key)
         if found is None:
@@ -271,18 +273,19 @@ class _Grounder:
         return table.get(tuple(values[n] for n in known), frozenset())
 
     def _shape_of(self, f: Forall | Exists) -> _Shape:
-        """The variables in a formula, and its guards.
+        """The variables in a formula, its guards, and whether its step atoms are positive.
 
         Guards are static atoms and actions that the part requires under ``exists``, and its
         negation under ``forall``: where one of them is false, the instance is no matter.  An action
         is one only if all else is static: literals beside it count, whether or not it is done.
         """
         leaves = [leaf for leaf, _ in literals(f)]
+        signs = {sign for leaf, sign in literals(f) if isinstance(leaf, StepAtom)}
         names = tuple(sorted(term for term in _terms(leaves) if term.startswith("?")))
         part = f.part if isinstance(f, Exists) else negated(f.part)
         changing = {leaf for leaf in leaves if not self._is_static(leaf)}
         steps = tuple(p for p in conjuncts(part) if isinstance(p, StepAtom) and {p} == changing)
-        return names, self._static_atoms(part), steps
+        return names, self._static_atoms(part), steps, signs
 
     def _static_atoms(self, f: Formula) -> tuple[Atom, ...]:
         """The static atoms among the parts that must all hold."""

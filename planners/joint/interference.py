@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
@@ -10,7 +11,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from planners.grounding.actions import GroundAction
-from planners.joint.tables import Bools
+from planners.joint.tables import Bools, Ints
 from planners.pddl.formula_tree import Leaf, forbidden_steps, formula_text, literals, substituted
 from planners.pddl.lifted import FALSE, Atom, Effect, Formula, StepAtom, Truth
 
@@ -129,13 +130,16 @@ class Choices:
         #: The subactions with more than one owner, by label.
         self.shared = {n: a for n, a in enumerate(actions) if a and len(a.owners) > 1}
         #: By field of the footprint the labels in which each atom stands there.
-        self.labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint._fields}
+        self.labels: dict[str, dict[Leaf, Ints]] = {}
+        found = {field: defaultdict[Leaf, list[int]](list) for field in Footprint._fields}
         for number, action in enumerate(actions):
             if action:
                 own = footprint(action, frozenset((action.name,)))
-                for field, labels in self.labels.items():
+                for field, labels in found.items():
                     for leaf in getattr(own, field):
-                        labels.setdefault(leaf, []).append(number)
+                        labels[leaf].append(number)
+        for field, labels in found.items():
+            self.labels[field] = {leaf: np.array(numbers) for leaf, numbers in labels.items()}
 
 
 def compatible(left: Choices, right: Choices, i: int, j: int) -> Bools:
@@ -167,5 +171,5 @@ def meeting(left: Choices, right: Choices, one: str, other: str) -> Bools:
     for first, second in ((one, other), (other, one)):
         rows, columns = left.labels[first], right.labels[second]
         for leaf in rows.keys() & columns.keys():
-            found[np.ix_(rows[leaf], columns[leaf])] = True
+            found[rows[leaf][:, None], columns[leaf]] = True
     return found
