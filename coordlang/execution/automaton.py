@@ -266,4 +266,4 @@ def _witness(
         assert plan is not None, "plans with the sentence are plans of the task"
         paths.append(plan)
     names = tuple(task_language.partition.words[w] for w in words)
-    return describe_failure(space, Trail(start, tuple(zip(*paths, strict=True))), names)
+    return describe_failure(space, Trail(start, paths), names)

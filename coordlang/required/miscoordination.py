@@ -31,10 +31,10 @@ _Way = tuple[Labels, "_Way"] | None
 
 @dataclass(frozen=True, slots=True)
 class Trail:
-    """Plans to a breaking step: where they start, and the edges of each plan, step by step."""
+    """Plans, as edges, up to a breaking step or further: each robot's, and where all start."""
 
     start: int
-    edges: tuple[tuple[int, ...], ...]
+    plans: Sequence[Sequence[int]]
 
 
 def earliest_witness(choices: Choices, start: int) -> Trail:
@@ -48,7 +48,7 @@ def earliest_witness(choices: Choices, start: int) -> Trail:
         mixed, way = way
         steps.insert(0, mixed)
     plans = _shared_plans(choices.space, start, steps)
-    return Trail(start, tuple(zip(*(plan[: len(steps)] for plan in plans), strict=True)))
+    return Trail(start, [plan[: len(steps)] for plan in plans])
 
 
 def _first_break(choices: Choices, start: int) -> _Way:
@@ -105,19 +105,19 @@ def through_same_states(space: PlanSpace, trail: Trail) -> Trail:
     As many robots as is easily possible follow the same plan.
     """
     on = np.zeros(len(space), np.bool_)
-    on[space.nodes_on(trail.start, [edges[0] for edges in trail.edges])] = True
+    on[space.nodes_on(trail.start, trail.plans[0])] = True
     task = np.flatnonzero(space.starts == trail.start)[:1]
     fits = replace(space, starts=space.starts[task], second=space.second[task]).within(on)
     _, mixture = _mixture(space, trail)
     plans = _shared_plans(fits, int(fits.starts[0]), mixture)
     paths = (space.path_with(trail.start, list(map(fits.labels_of, plan))) for plan in plans)
-    return Trail(trail.start, tuple(zip(*(path for path in paths if path), strict=True)))
+    return Trail(trail.start, [path for path in paths if path])
 
 
 def _mixture(space: PlanSpace, trail: Trail) -> tuple[list[int], list[Labels]]:
     """The nodes that the mixture of a trail passes, and its steps up to the one that breaks."""
     nodes, steps = [trail.start], list[Labels]()
-    for edges in trail.edges:
+    for edges in zip(*trail.plans, strict=True):
         steps.append(tuple(space.labels_of(edge)[robot] for robot, edge in enumerate(edges)))
         mixed = space.edge_with(nodes[-1], steps[-1])
         if mixed is None:
@@ -220,10 +220,7 @@ def describe_failure(
     The mixture goes up to its breaking step, with the reason why it breaks.
     """
     model = space.model
-    paths = [
-        [*edges, *space.first_path(space.target_of(edges[-1]))]
-        for edges in zip(*trail.edges, strict=True)
-    ]
+    paths = [[*plan, *space.first_path(space.target_of(plan[-1]))] for plan in trail.plans]
     nodes, mixture = _mixture(space, trail)
 
     def keys(passed: Sequence[int]) -> tuple[str, ...]:
@@ -252,7 +249,7 @@ def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
     steps = model.successors(row[None, :])
     same = np.flatnonzero((steps.labels == np.array(labels)).all(axis=1))
     if not len(same):
-        return model.why_not(row, labels)
+        return model.stepper.why_not(row, labels)
     goal = space.goals[space.goal[node]]
     left = int(space.layer[node]) - 1
     try:

@@ -73,7 +73,7 @@ def verify(partition: Partition, spaces: Sequence[PlanSpace]) -> Verdict:
         nodes += walked
         if goal is not None:
             part, trail, walked = _violation(space, word, goal)
-            first_plan = part.nodes_on(trail.start, [step[0] for step in trail.edges])
+            first_plan = part.nodes_on(trail.start, trail.plans[0])
             said = sentence(word[part.state[first_plan]].tolist())
             words = tuple(partition.words[number] for number in said)
             return Verdict(False, tasks, nodes + walked, describe_failure(part, trail, words))

@@ -366,8 +366,7 @@ class SetWalk:
             found, nodes = self._walk([start], before)
             walked += nodes
             if found is not None:
-                plans = self._plans(start, found, before)
-                return Trail(start, tuple(zip(*plans, strict=True))), walked
+                return Trail(start, self._plans(start, found, before)), walked
         raise AssertionError("the violation has a start")
 
     def _plans(

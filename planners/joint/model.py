@@ -258,10 +258,6 @@ class JointModel:
         """The row of an initial state: the fluents among ``atoms`` (statics are left out)."""
         return self.codec.encode(sorted(show(a) for a in atoms if a not in self.statics))
 
-    def why_not(self, row: Rows, labels: Sequence[int]) -> str:
-        """Why these labels are no joint step in a state, in words."""
-        return self.stepper.why_not(self.codec.facts_part(row), labels)
-
     def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
         """See `Stepper.joint_action`."""
         return self.stepper.joint_action(self.codec.facts_part(row), labels)
