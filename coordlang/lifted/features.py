@@ -120,21 +120,8 @@ class Role(Expression):
 
 
 @dataclass(frozen=True)
-class Everything(Expression):
-    """All objects."""
-
-    FORMS = ("all", "any")
-
-    def __str__(self) -> str:
-        return "all"
-
-    def __call__(self, states: States) -> Bools:
-        return np.ones((len(states), len(states.world.objects)), bool)
-
-
-@dataclass(frozen=True)
 class Named(Expression):
-    """The objects of a type, or of which a predicate with one argument is true."""
+    """All objects, those of a type, or those of which a predicate with one argument is true."""
 
     FORMS = ("{}", "{}")
     name: str
@@ -201,7 +188,7 @@ class Some(Expression):
         return self.role.some(states, states.get(self.concept))
 
 
-Concept = Everything | Named | One | Without | Both | Some
+Concept = Named | One | Without | Both | Some
 
 
 # ---- terms and numbers
@@ -416,10 +403,9 @@ def feature_of(text: str, position: Position) -> Feature:
     except (LookupError, ValueError, BadInput):
         found = None
     if found is None or str(found) != " ".join(text.split()):
-        raise BadInput(
+        raise position.fail(
             f"{echoed(text)} defines no feature",
-            position=position,
-            remedy="As in (mod (row (at r1)) 3), (sign (- (row (at r1)) (row (at r2)))) or "
+            "As in (mod (row (at r1)) 3), (sign (- (row (at r1)) (row (at r2)))) or "
             "(min (count holds r1 _) 1).",
         )
     return found
@@ -445,7 +431,7 @@ def _read(kind: str, tree: Tree) -> Any:
         case "Role", ["closure", one]:
             return replace(_read("Role", one), closure=True)  # twice is refused: it is written once
         case "Concept", str():
-            return Everything() if tree == "all" else Named(tree)
+            return Named(tree)
         case _, [str(head), *parts]:
             return _of_parts(kind, head, parts)
     raise ValueError
@@ -521,6 +507,8 @@ def english(part: object) -> str:
         case Role(predicate, inverse, closure):
             steps = " in one or more steps" * closure
             return f"{'inversely ' * inverse}{predicate}-related{steps}"
+        case Named("all"):
+            return "any"
         case Expression():
             return part.FORMS[1].format(*map(english, part.parts))
     return str(part)

@@ -16,7 +16,6 @@ from coordlang.lifted.features import (
     Concept,
     Count,
     Distance,
-    Everything,
     Feature,
     Gap,
     Least,
@@ -111,7 +110,7 @@ class _Vocabulary:
             if all(positions(world.relations.get(name, ())) for world in worlds)
         ]
         sets = {name for name, arity in self.fluents if arity == 1}.union(*map(_sets, worlds))
-        self.sets = sorted(sets - {str(Everything())})  # what is called so is not read back
+        self.sets = sorted(sets)
 
     def terms(self) -> Iterator[Term]:
         for (predicate, arity), name in product(self.fluents, self.named):
@@ -128,7 +127,7 @@ class _Vocabulary:
 
 
 def _sets(world: World) -> set[str]:
-    """The types of a world, and its static predicates with one argument."""
+    """The types of a world, ``all`` among them, and its static predicates with one argument."""
     unary = {name for name, tuples in world.statics.items() if any(len(a) == 1 for a in tuples)}
     return unary.union(world.types)
 
@@ -208,7 +207,6 @@ def _next_concepts(
 ) -> Iterator[Concept]:
     """Concepts of a complexity, made of those of less."""
     if complexity == 1:
-        yield Everything()
         yield from map(Named, vocabulary.sets)
         yield from map(One, vocabulary.named)
     yield from map(Without, levels[complexity - 1])

@@ -50,9 +50,9 @@ class World(Asked):
     """A problem of a domain, as features see it.
 
     All ``objects`` by name, sorted; ``robots`` in the order of the model; ``types``: each type's
-    objects; ``statics``: the argument tuples of each predicate's static atoms, sorted; the joint
-    ``model`` whose states are read; ``points``: where places lie, x to the right and y down: those
-    given for objects of the problem, else of names such as ``c2-3``.
+    objects, and those of ``all``; ``statics``: the argument tuples of each predicate's static
+    atoms, sorted; the joint ``model`` whose states are read; ``points``: where places lie, x to the
+    right and y down: those given for objects of the problem, else of names such as ``c2-3``.
     """
 
     def __init__(
@@ -69,6 +69,7 @@ class World(Asked):
             for each in own:
                 for kind in supertypes(domain.types, each):
                     self.types[kind].add(name)
+        self.types["all"] = set(problem.objects)  # whatever else is called so
         self.points = {name: point for name, point in points.items() if name in problem.objects}
         for linked in self.relations.values():
             by_names = from_names(sorted({*chain(*linked)}), linked) or {}

@@ -68,7 +68,7 @@ def _number(number: f.Number, objects: Objects, statics: State, state: State) ->
 def members(concept: f.Concept, objects: Objects, statics: State, state: State) -> set[str]:
     """The objects in a concept."""
     match concept:
-        case f.Everything():
+        case f.Named("all"):
             return set(objects)
         case f.Named(name):
             atoms = [*statics.get(name, ()), *state.get(name, ())]

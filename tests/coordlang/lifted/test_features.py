@@ -92,10 +92,8 @@ def concepts(world: World) -> st.SearchStrategy[f.Concept]:
     sets = [*world.types, *fluents, *world.statics, "nothing"]
     roles = [*fluents, *world.relations, "nowhere"]
     role = st.builds(f.Role, st.sampled_from(roles), st.booleans(), st.booleans())
-    simple: st.SearchStrategy[f.Concept] = (
-        st.just(f.Everything())
-        | st.builds(f.Named, st.sampled_from(sets))
-        | st.builds(f.One, st.sampled_from([*world.objects, "nobody"]))
+    simple: st.SearchStrategy[f.Concept] = st.builds(f.Named, st.sampled_from(sets)) | st.builds(
+        f.One, st.sampled_from([*world.objects, "nobody"])
     )
 
     def larger(inner: st.SearchStrategy[f.Concept]) -> st.SearchStrategy[f.Concept]:
