@@ -21,11 +21,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from planners.classical.selection import select_then_apply
-from planners.classical.selectors import Selectors, in_step, selectors_of
+from planners.classical.selectors import Selectors, selectors_of
 from planners.classical.task import LONGEST, ClassicalTask, Form, Known
 from planners.classical.writer import TooManyError, Writer, goal_formula, known_literals
 from planners.joint.model import JointModel, PlanningTask, show
-from planners.pddl.formula_tree import GroundLeaf, joined, literals, substituted
+from planners.pddl.formula_tree import GroundLeaf, in_step, joined, literals, substituted
 from planners.pddl.lifted import TRUE, And, Atom, Effect, Formula, Truth
 
 

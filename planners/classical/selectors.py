@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -12,14 +12,14 @@ from planners.classical.writer import state_reader
 from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel
 from planners.pddl.formula_tree import (
-    GroundLeaf,
     forbidden_steps,
+    in_step,
     joined,
     literals,
     negated,
     substituted,
 )
-from planners.pddl.lifted import FALSE, And, Atom, Effect, Equal, Formula, StepAtom, Truth
+from planners.pddl.lifted import FALSE, And, Atom, Effect, Equal, Formula, StepAtom
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,15 +166,6 @@ def _with_effects(action: GroundAction, *step: GroundAction) -> GroundAction:
     there = {each.name for each in (action, *step)}
     kept = tuple(e for e in action.effects if in_step(e.condition, there) != FALSE)
     return replace(action, effects=kept)
-
-
-def in_step(formula: Formula, step: Collection[StepAtom]) -> Formula:
-    """What a formula says of the state where exactly these actions are done in the step."""
-
-    def value(leaf: GroundLeaf) -> Formula:
-        return Truth(leaf in step) if isinstance(leaf, StepAtom) else leaf
-
-    return substituted(formula, value)
 
 
 def _conditions(action: GroundAction) -> Iterator[tuple[Atom | StepAtom, bool]]:

@@ -12,8 +12,8 @@ import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.tables import Bools, Ints
-from planners.pddl.formula_tree import Leaf, forbidden_steps, formula_text, literals, substituted
-from planners.pddl.lifted import FALSE, Atom, Effect, Formula, StepAtom, Truth
+from planners.pddl.formula_tree import Leaf, forbidden_steps, formula_text, in_step, literals
+from planners.pddl.lifted import FALSE, Atom, Effect, StepAtom
 
 T = TypeVar("T")
 
@@ -45,18 +45,18 @@ class Footprint(NamedTuple):
     named: frozenset[StepAtom]
 
 
-def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> Footprint:
-    """The `Footprint` of a ground action.
+def footprint(action: GroundAction, *others: GroundAction) -> Footprint:
+    """The `Footprint` of a ground action where just these others are in the step.
 
-    ``step`` are the subactions of the pair: effects whose condition needs others, or none of these,
-    are left out.  None: every effect counts.
+    Effects whose condition needs more, or fewer, are left out.
     """
+    step = {action.name, *(other.name for other in others)}
     precondition = literals(action.precondition)
     required, named, effects = [*precondition], [*precondition], list[Effect]()
     for effect in action.effects:
         found = literals(effect.condition)
         named += found
-        if step is None or not found or _can_fire(effect.condition, step):
+        if not found or in_step(effect.condition, step) != FALSE:
             effects.append(effect)
             required += found
     adds = frozenset([e.atom for e in effects if e.adds])
@@ -82,22 +82,12 @@ def _leaves(
     return frozenset([a for a, positive in found if isinstance(a, kind) and positive in signs])
 
 
-def _can_fire(condition: Formula, step: frozenset[StepAtom]) -> bool:
-    """Whether a condition is true in some state, with exactly these subactions in the step."""
-
-    def value(leaf: Atom | StepAtom) -> Formula:
-        return Truth(leaf in step) if isinstance(leaf, StepAtom) else leaf
-
-    return substituted(condition, value) != FALSE
-
-
 def conflict(a: GroundAction, b: GroundAction) -> str | None:
     """Why two subactions of different robots cannot share a step, in words; None if they can.
 
     The rule of docs/pddl.md, read literally; `compatible` is the same for whole tables.
     """
-    pair = frozenset((a.name, b.name))
-    first, second = footprint(a, pair), footprint(b, pair)
+    first, second = footprint(a, b), footprint(b, a)
     sides = ((a, first, b, second), (b, second, a, first))
     for one, own, other, its in sides:
         if own.excluded & its.names:
@@ -134,7 +124,7 @@ class Choices:
         found = {field: defaultdict[Leaf, list[int]](list) for field in Footprint._fields}
         for number, action in enumerate(actions):
             if action:
-                own = footprint(action, frozenset((action.name,)))
+                own = footprint(action)
                 for field, labels in found.items():
                     for leaf in getattr(own, field):
                         labels[leaf].append(number)

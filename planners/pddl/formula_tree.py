@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 from planners.pddl.lifted import (
@@ -140,6 +140,15 @@ def substituted(formula: Formula, value: Callable[[GroundLeaf], Formula]) -> For
             return value(formula)
     assert isinstance(formula, Truth), "a quantifier in a ground formula"
     return formula
+
+
+def in_step(formula: Formula, step: Collection[StepAtom]) -> Formula:
+    """What a formula says of the state where exactly these actions are done in the step."""
+
+    def value(leaf: GroundLeaf) -> Formula:
+        return Truth(leaf in step) if isinstance(leaf, StepAtom) else leaf
+
+    return substituted(formula, value)
 
 
 def label(name: str, args: Iterable[Term]) -> str:
