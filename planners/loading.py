@@ -17,7 +17,7 @@ from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import Team, find_team, fluent_predicates, natural, static_atoms
-from planners.system.errors import BadInput, Position, UsageError
+from planners.system.errors import Position, UsageError
 from planners.system.limits import reaching
 from planners.system.messages import Presented, echoed
 
@@ -109,16 +109,14 @@ def _joint_model(
     fluents = fluent_predicates(domain)
     facts = FactTable.of([*(atom for atom in possible if atom.predicate in fluents), *slack])
     codec = StateCodec(facts, robots, labels if options.remember_actions else None)
-    evaluator = Evaluator(facts, _step_atoms(subactions))
+    evaluator = Evaluator(codec, _step_atoms(subactions))
     idling = idling_costs(domain, problem, team, costs=options.cost == "makespan+cost")
     stepper: Stepper
     if domain.is_joint_action:
         positions = {s.name: s.position for s in domain.schemas}
-        stepper = JointActionStepper(
-            codec, evaluator, robots, labels, actions, options.cost, positions
-        )
+        stepper = JointActionStepper(evaluator, robots, labels, actions, options.cost, positions)
     else:
-        stepper = ComposingStepper(codec, evaluator, robots, subactions, options.cost, idling)
+        stepper = ComposingStepper(evaluator, robots, subactions, options.cost, idling)
     return JointModel(
         robots=robots,
         labels=labels,
@@ -181,9 +179,8 @@ def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
         (":init", [f"function value {show(atom)}" for atom, _ in values]),
     ):
         if odd:
-            raise BadInput(
+            raise other.source.section(section).fail(
                 f"{min(odd)} is not the same in all problems",
-                position=other.source.section(section),
-                remedy=f"Compared with {first.source.name}: the problems of one model have the "
+                f"Compared with {first.source.name}: the problems of one model have the "
                 "same objects and statics.",
             )

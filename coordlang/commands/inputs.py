@@ -247,14 +247,13 @@ def load_language(path: given.File) -> Language:
 
 def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
     """Read a task list, with what messages call it."""
-    from coordlang.language.listed import TASKS, read_task_file, tasks_from_data
+    from coordlang.language.listed import TASKS, TASKS_GIVEN, read_task_file, tasks_from_data
 
     if isinstance(tasks, str | PathLike):
         return read_task_file(fspath(tasks)), Position(fspath(tasks))
     head = {"format": TASKS.format, "version": TASKS.version}
     data = dict(tasks) if isinstance(tasks, Mapping) else {**head, "tasks": list(tasks)}
-    position = Position("the tasks")
-    return tasks_from_data(data, position), position
+    return tasks_from_data(data, TASKS_GIVEN), TASKS_GIVEN
 
 
 def read_language(language: given.LanguageSource) -> tuple[Language | LiftedLanguage, Position]:

@@ -31,7 +31,6 @@ from coordlang.lifted.learning import Instance, Learned, learn
 from coordlang.verification.by_definition import verify_candidates
 from planners.parallel.workers import Workers
 from planners.system.errors import (
-    BadInput,
     OutOfMemory,
     Position,
     ProvedImpossible,
@@ -121,10 +120,9 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
     for own in every:
         if own.candidates.model.robots != robots:
             others = ", ".join(own.candidates.model.robots)
-            raise BadInput(
+            raise Position(own.candidates.loaded.problems[0].source.name).fail(
                 f"the robots are {others}, those of {every[0].name} {', '.join(robots)}",
-                position=Position(own.candidates.loaded.problems[0].source.name),
-                remedy="Words are about robots by name: use the same names.",
+                "Words are about robots by name: use the same names.",
             )
     with Jobs(options.jobs).opened() as workers:
         learned = learn(

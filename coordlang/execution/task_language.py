@@ -25,6 +25,9 @@ from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, UsageError, note
 from planners.system.messages import Presented, echoed
 
+#: What messages call a language that is of no file.
+LANGUAGE_FILE = Position("the language file")
+
 
 class NoPlanFits(Refuted):
     """No optimal plan of the task has this sentence.
@@ -179,14 +182,13 @@ def language_in_task(
     domain: Domain,
     problem: Problem,
     options: ModelOptions | None = None,
-    position: Position | None = None,
+    position: Position = LANGUAGE_FILE,
 ) -> TaskLanguage:
     """A language in the task of a PDDL problem.
 
     Raises `BadInput` when domain or problem are not the language's, `ProvedImpossible` for an
     unsolvable task.
     """
-    position = position or Position("the language file")
     check_source(language, domain, [problem], position)
     listed = recorded_list(language)
     options = options or options_of(language)

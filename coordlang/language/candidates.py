@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from coordlang.language.listed import (
+    TASKS_GIVEN,
     ListedTask,
     first_of_equal,
     goal_text,
@@ -30,7 +31,7 @@ from planners.search.plan_space import PlanSpace
 from planners.search.portions import Explored, Searched, Source
 from planners.search.reachable import Exploration, Space, explore
 from planners.search.state_variables import state_variables
-from planners.system.errors import BadInput, Position, ProvedImpossible, note
+from planners.system.errors import Position, ProvedImpossible, note
 
 Kind = Literal["problems", "all", "file"]
 
@@ -104,7 +105,7 @@ def from_problems(
     numbers = first_of_equal(listed)
     listed = [listed[number] for number in numbers]
     tasks = [loaded.tasks[number] for number in numbers]
-    return _one_by_one("problems", loaded, listed, tasks, None, skip_unsolvable)
+    return _one_by_one("problems", loaded, listed, tasks, skip_unsolvable)
 
 
 def all_pairs(
@@ -139,7 +140,7 @@ def from_listed(
     problems: Sequence[Problem],
     listed: Sequence[ListedTask],
     options: ModelOptions | None = None,
-    position: Position | None = None,
+    position: Position = TASKS_GIVEN,
     *,
     skip_unsolvable: bool = False,
 ) -> Candidates:
@@ -153,16 +154,14 @@ def from_listed(
     an initial state that the problem's does not reach (such a state is taken for a mistake).
     """
     if not listed:
-        raise BadInput(
-            "the list of tasks is empty", position=position, remedy="Give at least one task."
-        )
+        raise position.fail("the list of tasks is empty", "Give at least one task.")
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
     model, starts, inits = loaded.model, _inits(loaded.tasks), _inits(tasks)
     space = explored_if_small(model, starts)
     if space is None:
         _refuse_first(_surely_unreachable(model, starts, inits), loaded, inits, position)
         _note_unchecked(loaded, tasks, position)
-        return _one_by_one("file", loaded, listed, tasks, position, skip_unsolvable)
+        return _one_by_one("file", loaded, listed, tasks, skip_unsolvable, position)
     reached, _ = unique_rows(model.codec.facts_part(space.rows))
     unreachable = find_rows(reached, model.codec.facts_part(inits)) < 0
     _refuse_first(unreachable, loaded, inits, position)
@@ -182,15 +181,14 @@ def _inits(tasks: Sequence[PlanningTask]) -> Rows:
 
 
 def _refuse_first(
-    unreachable: Bools, loaded: PlanningInstance, inits: Rows, position: Position | None
+    unreachable: Bools, loaded: PlanningInstance, inits: Rows, position: Position
 ) -> None:
     """Raise `BadInput` for the first initial state of a task that the problem does not reach."""
     for number in np.flatnonzero(unreachable)[:1].tolist():
-        raise BadInput(
+        raise position.fail(
             f"task {number + 1}: the state {loaded.model.state_text(inits[number])} cannot be "
             f"reached from the initial state of {loaded.problems[0].source.name}",
-            position=position,
-            remedy="Is a fluent missing or one too many?  List all fluents that are true.",
+            "Is a fluent missing or one too many?  List all fluents that are true.",
         )
 
 
@@ -237,7 +235,7 @@ def _surely_unreachable(model: JointModel, starts: Rows, inits: Rows) -> Bools:
 
 
 def _note_unchecked(
-    loaded: PlanningInstance, tasks: Sequence[PlanningTask], position: Position | None
+    loaded: PlanningInstance, tasks: Sequence[PlanningTask], position: Position
 ) -> None:
     """Say how many listed tasks start where it is not checked that the problem comes there."""
     known = {task.init.tobytes() for task in loaded.tasks}
@@ -255,8 +253,8 @@ def _one_by_one(
     loaded: PlanningInstance,
     listed: Sequence[ListedTask],
     tasks: Sequence[PlanningTask],
-    position: Position | None,
     skip_unsolvable: bool = False,
+    position: Position = TASKS_GIVEN,
 ) -> Candidates:
     """Each task searched by itself; those without a plan are left out if they may be, but one.
 
@@ -309,7 +307,7 @@ def _named(number: int, task: ListedTask) -> str:
 
 
 def _unsolvable(
-    number: int, task: ListedTask, position: Position | None, remedy: str | None
+    number: int, task: ListedTask, position: Position, remedy: str | None
 ) -> ProvedImpossible:
     init, goal = _texts(task)
     return ProvedImpossible(
@@ -324,11 +322,11 @@ def from_recorded(
     problems: Sequence[Problem],
     listed: Sequence[ListedTask],
     options: ModelOptions | None = None,
-    position: Position | None = None,
+    position: Position = TASKS_GIVEN,
 ) -> Candidates:
     """Problems' tasks as a language file records them, searched one by one."""
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
-    return _one_by_one("problems", loaded, listed, tasks, position)
+    return _one_by_one("problems", loaded, listed, tasks)
 
 
 def describe(space: PlanSpace, task: int) -> str:

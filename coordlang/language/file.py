@@ -18,7 +18,7 @@ from coordlang.language.listed import ListedTask, each_once
 from coordlang.language.provenance import Guarantee, Provenance, Tolerance
 from coordlang.language.words import Language
 from planners.pddl.model_options import Cost, Execution, Unowned
-from planners.system.errors import BadInput, Position
+from planners.system.errors import Position
 from planners.system.files import FileFormat, doc, read_bytes, require_seen
 from planners.system.messages import echoed
 from planners.system.writing import write_compressed
@@ -169,10 +169,8 @@ def refuse_duplicates(data: bytes, position: Position) -> None:
     def different(pairs: Sequence[tuple[str, Any]]) -> None:
         if len({key for key, _ in pairs}) < len(pairs):
             (key, _), *_ = Counter(key for key, _ in pairs).most_common(1)
-            raise BadInput(
-                f"the key {echoed(key)} occurs twice",
-                position=position,
-                remedy="Of two entries one would be lost.",
+            raise position.fail(
+                f"the key {echoed(key)} occurs twice", "Of two entries one would be lost."
             )
 
     json.loads(data, object_pairs_hook=different, parse_int=str, parse_float=str)
@@ -238,10 +236,9 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
     """The language in the text of a language file; see `read_language`."""
     record = LANGUAGE.decode(data, position)
     if msgspec.json.decode(data[data.index(b"{") :], type=_Older).also:
-        raise BadInput(
+        raise position.fail(
             "states have several words here ('also'), which is no longer read",
-            position=position,
-            remedy="Build the language again, without --overlap.",
+            "Build the language again, without --overlap.",
         )
     refuse_duplicates(data, position)
     refuse_first(faults_of_words(record), position)
@@ -278,7 +275,7 @@ def present(record: msgspec.Struct) -> dict[str, Any]:
 def refuse_first(faults: Iterator[Fault], position: Position) -> None:
     """Raise `BadInput` for the first fault, if there is one."""
     for what, remedy in faults:
-        raise BadInput(what, position=position, remedy=remedy)
+        raise position.fail(what, remedy)
 
 
 def faults_of_model(

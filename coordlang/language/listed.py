@@ -31,6 +31,9 @@ from planners.search.reachable import explore
 from planners.system.errors import BadInput, Position, ProvedImpossible, UsageError, note
 from planners.system.files import FileFormat, doc, read_bytes
 
+#: What messages call tasks that are of no file.
+TASKS_GIVEN = Position("the tasks")
+
 
 @dataclass(frozen=True, slots=True)
 class ListedTask:
@@ -55,7 +58,7 @@ def model_of_listed(
     problems: Sequence[Problem],
     listed: Sequence[ListedTask],
     options: ModelOptions | None = None,
-    position: Position | None = None,
+    position: Position = TASKS_GIVEN,
 ) -> tuple[PlanningInstance, list[PlanningTask]]:
     """The joint model in which listed tasks can start, and these tasks in it, named by number.
 
@@ -86,7 +89,7 @@ def goal_atoms(goal: Goal) -> tuple[str, ...]:
 
 
 def ground_tasks(
-    domain: Domain, problem: Problem, listed: Iterable[ListedTask], position: Position | None = None
+    domain: Domain, problem: Problem, listed: Iterable[ListedTask], position: Position = TASKS_GIVEN
 ) -> Iterator[tuple[frozenset[Atom], Formula]]:
     """The true fluents at the start, and the ground goal, of each task.
 
@@ -105,35 +108,31 @@ def _read_init(
     problem: Problem,
     fluents: Set[str],
     task: ListedTask,
-    position: Position | None,
+    position: Position,
 ) -> frozenset[Atom]:
     atoms = set()
     for text in task.init:
         formula = _read_text(names, text, position)
         if not isinstance(formula, Atom):
-            raise BadInput(
+            raise position.fail(
                 f"{text} is no atom: 'init' lists what is true",
-                position=position,
-                remedy="Leave out what is false: all that 'init' does not list.",
+                "Leave out what is false: all that 'init' does not list.",
             )
         if formula.predicate not in fluents and formula not in problem.init:
-            raise BadInput(
+            raise position.fail(
                 f"{text} is static and false in {problem.source.name}",
-                position=position,
-                remedy="Tasks of one file share their static facts: leave it out.",
+                "Tasks of one file share their static facts: leave it out.",
             )
         atoms.add(formula)
     return frozenset(atom for atom in atoms if atom.predicate in fluents)
 
 
-def _read_text(names: Names, text: str, position: Position | None) -> Formula:
+def _read_text(names: Names, text: str, position: Position) -> Formula:
     try:
         parts = split_atoms(text)
         if len(parts) != 1:
-            raise BadInput(
-                "expected one PDDL literal", remedy="As in (at r1 a) or (not (at r1 a))."
-            )
-        root = parse(Source(position.file if position else "task", parts[0]))
+            raise position.fail("expected one PDDL literal", "As in (at r1 a) or (not (at r1 a)).")
+        root = parse(Source(position.file, parts[0]))
         return read_formula(names, root)
     except BadInput as error:
         raise BadInput(f"{text}: {error.what}", position=position, remedy=error.remedy) from None

@@ -85,12 +85,10 @@ def check_source(
     check_domain(language, domain, position)
     for problem in problems:
         if not _is_of_world(language, domain, problem):
-            raise BadInput(
+            raise position.fail(
                 f"{problem.source.name} has other objects or static facts than the language's "
                 "problem",
-                position=position,
-                remedy="A language serves the problems of one world: same objects, same static "
-                "facts.",
+                "A language serves the problems of one world: same objects, same static facts.",
             )
 
 
@@ -99,12 +97,11 @@ def check_domain(language: Language, domain: Domain, position: Position) -> None
     wanted = language.provenance.domain.get("sha256")
     known = domain_sha256(domain), domain.source.sha256, domain.source.text_sha256
     if wanted not in (None, *known):
-        raise BadInput(
+        raise position.fail(
             "this language belongs to another domain "
             f"({echoed(language.provenance.domain.get('name'))}): what "
             f"{domain.source.name} says has another hash",
-            position=position,
-            remedy="Give the domain file that the language was built from.",
+            "Give the domain file that the language was built from.",
         )
 
 
@@ -218,36 +215,31 @@ def _require_pairs(recorded: list[ListedTask], candidates: Candidates, position:
         if task.goal not in ends:
             ends[task.goal] = int(model.holds(goal, states).sum())
         if start not in reached or not ends[task.goal]:
-            raise BadInput(
+            raise position.fail(
                 f"these problems do not reach both states of the recorded task "
                 f"{' '.join(sorted(start))} -> {goal_text(model, goal)}",
-                position=position,
-                remedy=_ALSO,
+                _ALSO,
             )
         if ends[task.goal] > 1:
-            raise BadInput(
+            raise position.fail(
                 f"the recorded goal {goal_text(model, goal)} is one of several states, and would "
                 "not be served with all pairs of states",
-                position=position,
-                remedy="Say --tasks FILE with the tasks that count, or leave out --start.",
+                "Say --tasks FILE with the tasks that count, or leave out --start.",
             )
 
 
 def _require_all_pairs(language: Language, candidates: Candidates, position: Position) -> None:
     """Raise `BadInput` unless the candidate tasks are all pairs, with all that are recorded."""
     if candidates.kind != "all":
-        raise BadInput(
+        raise position.fail(
             "this language serves all pairs of states, and others cannot be added to them",
-            position=position,
-            remedy="Say --tasks all, with the problems whose states count.",
+            "Say --tasks all, with the problems whose states count.",
         )
     recorded, have = language.provenance.tasks["count"], f"have {candidates.count:,}"
     if candidates.count >= recorded:
         if language.states.keys() <= set(map(candidates.model.codec.key, candidates.rows)):
             return
         have = "do not reach all their states"
-    raise BadInput(
-        f"this language serves {recorded:,} pairs of states, but these problems {have}",
-        position=position,
-        remedy=_ALSO,
+    raise position.fail(
+        f"this language serves {recorded:,} pairs of states, but these problems {have}", _ALSO
     )

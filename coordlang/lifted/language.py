@@ -28,7 +28,7 @@ from coordlang.language.words import Language, Partition
 from coordlang.lifted.features import LARGEST, Feature, feature_of
 from coordlang.lifted.world import States
 from planners.joint.tables import Ints
-from planners.system.errors import BadInput, Position
+from planners.system.errors import Position
 from planners.system.files import FileFormat, doc, read_bytes, require_seen
 from planners.system.messages import echoed
 
@@ -127,11 +127,7 @@ def read_values(entries: Mapping[str, str], size: int, position: Position) -> di
             vector = ()
         is_plain = " ".join(map(str, vector)) == key and all(abs(v) < LARGEST for v in vector)
         if len(vector) != size or not is_plain:
-            raise BadInput(
-                f"{echoed(key)} are no values of {size} features",
-                position=position,
-                remedy=LIFT_AGAIN,
-            )
+            raise position.fail(f"{echoed(key)} are no values of {size} features", LIFT_AGAIN)
         found[vector] = word
     return found
 
@@ -152,11 +148,10 @@ def described(lifted: LiftedLanguage) -> Language:
 def require_robots(lifted: LiftedLanguage, robots: Sequence[str], position: Position) -> None:
     """Raise `BadInput` for other robots than those that the words are about."""
     if tuple(robots) != lifted.robots:
-        raise BadInput(
+        raise position.fail(
             f"the words are about {', '.join(lifted.robots)}, and the robots here are "
             f"{', '.join(robots)}",
-            position=position,
-            remedy="Use a problem with these robots, or name them with --robots.",
+            "Use a problem with these robots, or name them with --robots.",
         )
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from coordlang.execution.task_language import TaskLanguage
+from coordlang.execution.task_language import LANGUAGE_FILE, TaskLanguage
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import (
     LiftedWords,
@@ -262,7 +262,7 @@ def make_report(
     seed: int = 0,
     options: ModelOptions | None = None,
     coordinates: Mapping[str, Point] | None = None,
-    position: Position | None = None,
+    position: Position = LANGUAGE_FILE,
 ) -> Report:
     """Render the report of a language; the same arguments give the same bytes.
 
@@ -272,8 +272,7 @@ def make_report(
     messages name as the place of the language.  Raises `OutOfMemory` if the page of a single task
     would be too large, and what `coordlang.report.task.select_tasks` raises.
     """
-    position, points = position or Position("the language file"), coordinates or {}
-    options = options or options_of(language)
+    points, options = coordinates or {}, options or options_of(language)
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
     first = selection.tasks[0].language
     lifted = lifted_words(language, domain, problems[0], first.model, points, position)

@@ -19,7 +19,7 @@ import numpy as np
 from coordlang.execution.automaton import determinise
 from coordlang.execution.best_sentence import leading_sentences
 from coordlang.execution.plan_sentence import carried_out
-from coordlang.execution.task_language import TaskLanguage, language_in_task
+from coordlang.execution.task_language import LANGUAGE_FILE, TaskLanguage, language_in_task
 from coordlang.language.candidates import describe, explored_if_small
 from coordlang.language.listed import goal_text, ground_tasks
 from coordlang.language.recorded import recorded_list
@@ -101,7 +101,7 @@ def select_tasks(
     number: int,
     seed: int,
     options: ModelOptions | None = None,
-    position: Position | None = None,
+    position: Position = LANGUAGE_FILE,
 ) -> Selection:
     """Select at most ``number`` tasks: those of the problems, then different candidate tasks.
 
@@ -156,7 +156,7 @@ def _examined(name: str | None, language: TaskLanguage) -> ShownTask:
 
 
 def _candidates(
-    first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position | None
+    first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position
 ) -> Iterator[TaskLanguage]:
     """Yield the language's candidate tasks in random order, some of them more than once."""
     kind, explored, model = first.language.provenance.tasks.get("kind"), None, first.model.in_step

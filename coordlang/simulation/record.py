@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from coordlang.simulation.simulator import Wall
-from planners.system.errors import BadInput, Position
+from planners.system.errors import Position
 from planners.system.files import FileFormat, doc, read_bytes
 
 FORMAT = "coordlang/simulation"
@@ -187,7 +187,7 @@ def read_simulation(path: str | Path) -> SimulationRecord:
         if wrong := _wrong(record, run):
             remedy = "Write the record again: `coordlang simulate .. -o FILE.json`."
             what = f"the run with seed {run.seed}: {wrong}"
-            raise BadInput(what, position=position, remedy=remedy)
+            raise position.fail(what, remedy)
     return record
 
 

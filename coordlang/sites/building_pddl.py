@@ -17,7 +17,7 @@ import numpy as np
 from coordlang.sites.building import Building, Lane, Place, pddl_name
 from coordlang.sites.coordinates import Segment, checked, distance
 from planners.joint.tables import Bools
-from planners.system.errors import BadInput, Position, UsageError, note
+from planners.system.errors import Position, UsageError, note
 from planners.system.messages import counted, echoed, named, some, visible
 
 #: Metres that rounding may be wrong by.
@@ -253,8 +253,9 @@ def _robot_names(building: Building, asked: int | Sequence[str] | None) -> Seque
     """The PDDL names of the robots that are asked for: if by a number, those that spawn first."""
     if asked is None:
         if not building.spawning:
-            what, where = "no robot spawns in this building", Position(building.path)
-            raise BadInput(what, position=where, remedy="Say --robots 2.")
+            raise Position(building.path).fail(
+                "no robot spawns in this building", "Say --robots 2."
+            )
         return [*building.spawning]
     if isinstance(asked, int):
         taken = {*building.spawning, *building.places}

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import msgspec
 
-from planners.system.errors import BadInput, Position
+from planners.system.errors import Position
 from planners.system.files import FileFormat, doc, read_bytes
 from planners.system.messages import echoed
 
@@ -59,15 +59,14 @@ def checked(entries: Mapping[str, Point], position: Position) -> dict[str, Point
         if not all(abs(value) < _LARGEST for value in point):
             what = f"the coordinates must be between {-_LARGEST:g} and {_LARGEST:g}"
             remedy = "Scale the coordinates: only their proportions are drawn."
-            raise BadInput(f"{echoed(name)}: {what}", position=position, remedy=remedy)
+            raise position.fail(f"{echoed(name)}: {what}", remedy)
     points = {name.lower(): point for name, point in entries.items()}
     if len(points) < len(entries):
         what = "a place occurs twice, in upper and in lower case"
         remedy = "PDDL does not distinguish them: of two entries one would be lost."
-        raise BadInput(what, position=position, remedy=remedy)
+        raise position.fail(what, remedy)
     if len(set(points.values())) < len(points):
-        what, remedy = "two places have the same coordinates", "Give each one of its own."
-        raise BadInput(what, position=position, remedy=remedy)
+        raise position.fail("two places have the same coordinates", "Give each one of its own.")
     return points
 
 

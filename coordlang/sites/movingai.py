@@ -188,7 +188,7 @@ def _positions(robots: Iterable[str], cells: Iterable[str]) -> str:
 
 
 def _wrong(what: str, remedy: str, path: Path, line: int = 0, column: int = 1) -> BadInput:
-    return BadInput(what, position=Position(str(path), line, column), remedy=remedy)
+    return Position(str(path), line, column).fail(what, remedy)
 
 
 def _lines(path: Path, what: str) -> list[str]:

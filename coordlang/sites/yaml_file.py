@@ -11,7 +11,7 @@ from pathlib import Path
 import yaml
 
 from planners.system.errors import BadInput, Position
-from planners.system.files import check_utf8, read_bytes
+from planners.system.files import read_text
 from planners.system.messages import echoed
 
 #: What a file may hold at most: bytes, values, and lists and mappings in one another.
@@ -50,7 +50,7 @@ class Value:
 
     def wrong(self, what: str, remedy: str) -> BadInput:
         """The error of this value, with file, line and column (the caller raises it)."""
-        return BadInput(what, position=self.position, remedy=remedy)
+        return self.position.fail(what, remedy)
 
     def mapping(self) -> dict[str, Value]:
         """The values of a mapping by their keys; none for an empty value."""
@@ -124,9 +124,7 @@ def read_yaml(path: Path) -> Value:
     Raises `BadInput`, with the line, for what is no YAML, for tags, anchors and aliases (with them
     a short file is an endless one), and for too many or too deep values.
     """
-    data, file = read_bytes(path, most=_MOST_BYTES), str(path)
-    check_utf8(data, Position(file))
-    text = data.decode("utf-8-sig")
+    text, file = read_text(path, most=_MOST_BYTES), str(path)
     try:
         _require_plain(text, file)
         root = yaml.compose(text, _LOADER)
@@ -136,9 +134,9 @@ def read_yaml(path: Path) -> Value:
         if mark is not None:
             where = Position(file, mark.line + 1, mark.column + 1)
         remedy = "Write it with traffic editor, or correct it in a text editor."
-        raise BadInput(f"this is no YAML: {said}", position=where, remedy=remedy) from None
+        raise where.fail(f"this is no YAML: {said}", remedy) from None
     if root is None:
-        raise BadInput("the file is empty", position=Position(file), remedy="Is it the right file?")
+        raise Position(file).fail("the file is empty", "Is it the right file?")
     return Value(file, root)
 
 

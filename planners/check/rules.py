@@ -27,7 +27,6 @@ from planners.pddl.lifted import (
     StepAtom,
 )
 from planners.pddl.robots import Team
-from planners.system.errors import BadInput
 
 #: One entry per robot: the text of its subaction, or None for idling.
 Labels = Sequence[str | None]
@@ -279,11 +278,9 @@ class Rules:
                 reason = f"{action.text} is not applicable: {why}"
         if len(results) > 1:
             first, second = sorted(results.values())[:2]
-            raise BadInput(
+            raise self.domain.schemas[0].position.fail(
                 f"{first} and {second} have the same subactions but different results",
-                position=self.domain.schemas[0].position,
-                remedy="The subactions of a joint action must determine what it does: rename one "
-                "of them.",
+                "The subactions of a joint action must determine what it does: rename one of them.",
             )
         return next(iter(results), reason)
 

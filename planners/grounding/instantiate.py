@@ -36,7 +36,7 @@ from planners.pddl.lifted import (
     Variable,
 )
 from planners.pddl.robots import Team, fluent_predicates, objects_of, static_atoms
-from planners.system.errors import BadInput, Unsupported
+from planners.system.errors import Unsupported
 from planners.system.limits import reaching
 
 #: Variable -> the object that it stands for.
@@ -154,11 +154,10 @@ class _Grounder:
         if precondition == FALSE:
             return None
         if not owners:
-            raise BadInput(
+            raise schema.position.fail(
                 f"action {label(schema.name, args)} names no robot "
                 f"(robots: {', '.join(self._team.robots)})",
-                position=schema.position,
-                remedy="Say --unowned environment (one extra robot owns such actions) "
+                "Say --unowned environment (one extra robot owns such actions) "
                 "or --unowned shared (all robots choose them together).",
             )
         effects = tuple(e for effect in schema.effects for e in self._effect(effect, binding))
@@ -367,11 +366,10 @@ class _Grounder:
         atom = _bound(schema.cost, binding)
         value = self._problem.values.get(atom)
         if value is None or not 0 <= value <= MAX_COST or value != int(value):
-            raise BadInput(
+            raise schema.position.fail(
                 f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 "
                 f"to {MAX_COST} in the initial state "
                 f"of {self._problem.source.name}",
-                position=schema.position,
-                remedy="Give it a value in (:init ..), or leave out --cost makespan+cost.",
+                "Give it a value in (:init ..), or leave out --cost makespan+cost.",
             )
         return int(value)

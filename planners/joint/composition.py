@@ -14,12 +14,12 @@ from planners.grounding.actions import GroundAction
 from planners.joint.conditions import Evaluator, Labels, Operators, speaks_of_step
 from planners.joint.interference import Choices, compatible, conflict
 from planners.joint.model import Options, Stepper, Steps, products
-from planners.joint.states import StateCodec, TrueFacts
+from planners.joint.states import TrueFacts
 from planners.joint.tables import Bools, Ints, Numbers, Rows, differs, ranges, spans
 from planners.pddl.formula_tree import conjuncts, formula_text, joined, signed
 from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, StepAtom
 from planners.pddl.model_options import Cost
-from planners.system.errors import BadInput, OutOfMemory, Position
+from planners.system.errors import OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
 from planners.system.messages import counted
 
@@ -39,14 +39,13 @@ class ComposingStepper(Stepper):
 
     def __init__(
         self,
-        codec: StateCodec,
         evaluator: Evaluator,
         robots: Sequence[str],
         subactions: Sequence[Sequence[GroundAction]],
         cost: Cost,
         idling_costs: Sequence[int],
     ) -> None:
-        self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
+        self._evaluator, self._robots = evaluator, tuple(robots)
         self.labelled: list[list[GroundAction | None]] = [[None, *own] for own in subactions]
         known = [Choices(own) for own in self.labelled]
         self.tables = {
@@ -56,7 +55,7 @@ class ComposingStepper(Stepper):
         #: Pairs of robots some of whose labels may not meet.
         self._apart = {pair for pair, table in self.tables.items() if not table.all()}
         self._robot = [
-            _Subactions(own, codec, evaluator, number, cost, idling_costs[number])
+            _Subactions(own, evaluator, number, cost, idling_costs[number])
             for number, own in enumerate(self.labelled)
         ]
         #: For each robot the second cost component of each of its labels.
@@ -213,14 +212,13 @@ class _Subactions:
     def __init__(
         self,
         actions: Sequence[GroundAction | None],
-        codec: StateCodec,
         evaluator: Evaluator,
         robot: int,
         cost: Cost,
         idling_cost: int,
     ) -> None:
         self._evaluator = evaluator
-        self.operators = Operators(actions, codec, evaluator)
+        self.operators = Operators(actions, evaluator)
         # A shared subaction is paid once, by the first of its owners.
         own = [a.second_cost(cost) if a.owners[0] == robot else 0 for a in actions if a]
         self.cost = np.array([idling_cost, *own], np.int64)
@@ -286,18 +284,17 @@ class JointActionStepper(Stepper):
 
     def __init__(
         self,
-        codec: StateCodec,
         evaluator: Evaluator,
         robots: Sequence[str],
         labels: Sequence[Sequence[str]],
         actions: Sequence[GroundAction],
         cost: Cost,
-        positions: Mapping[str, Position | None],
+        positions: Mapping[str, Position],
     ) -> None:
         self._positions = positions
         self._robots = tuple(robots)
         self._names, self._actions = [tuple(own) for own in labels], tuple(actions)
-        self._operators = Operators(actions, codec, evaluator)
+        self._operators = Operators(actions, evaluator)
         numbers = [{text: n for n, text in enumerate(own)} for own in labels]
         self._labels = np.array(
             [[numbers[i][p] if p else 0 for i, p in enumerate(a.parts)] for a in actions], np.int32
@@ -319,11 +316,9 @@ class JointActionStepper(Stepper):
         unlike = np.flatnonzero(same[1:] & (result[1:] != result[:-1]).any(axis=1))
         if len(unlike):
             first, second = (self._actions[operator[unlike[0] + k]] for k in (0, 1))
-            raise BadInput(
+            raise self._positions[second.schema].fail(
                 f"{first.label} and {second.label} have the same subactions but different results",
-                position=self._positions.get(second.schema),
-                remedy="The subactions of a joint action must determine what it does: rename one "
-                "of them.",
+                "The subactions of a joint action must determine what it does: rename one of them.",
             )
         keep = ~same
         return Steps(row[keep], labels[keep], result[keep], cost[keep])

@@ -22,12 +22,12 @@ Labels = NDArray[np.int32]
 
 @dataclass(frozen=True, slots=True)
 class Evaluator:
-    """Knows the number of each fact, and for each subaction its owner and its label number.
+    """Knows the place of each fact, and for each subaction its owner and its label number.
 
     A fact that is not listed can never be true; a subaction that is not listed is never done.
     """
 
-    facts: FactTable
+    codec: StateCodec
     subactions: dict[StepAtom, tuple[int, int]]
 
     def holds(
@@ -46,7 +46,7 @@ class Evaluator:
                 return reduce(combine, values, np.full(len(which), combine.identity))
             case Truth(value):
                 return np.full(len(which), value)
-            case Atom() if (number := self.facts.index.get(formula)) is not None:
+            case Atom() if (number := self.codec.facts.index.get(formula)) is not None:
                 return test_bits(rows, which, number)
             case StepAtom() if (subaction := self.subactions.get(formula)) is not None:
                 assert labels is not None, "a formula about the joint step without labels"
@@ -62,7 +62,7 @@ def speaks_of_step(formula: Formula) -> bool:
 
 
 def split_condition(
-    precondition: Formula, evaluator: Evaluator
+    precondition: Formula, facts: FactTable
 ) -> tuple[frozenset[int], frozenset[int], list[Formula]]:
     """The facts that literals of a precondition need to be true, and false; and the rest of it.
 
@@ -73,8 +73,8 @@ def split_condition(
     rest: list[Formula] = []
     for part in conjuncts(precondition):
         inner, positive = signed(part)
-        if isinstance(inner, Atom) and inner in evaluator.facts:
-            known[positive].append(evaluator.facts.index[inner])
+        if isinstance(inner, Atom) and inner in facts:
+            known[positive].append(facts.index[inner])
         elif positive or not isinstance(inner, GroundLeaf):
             rest.append(part)
     return frozenset(known[True]), frozenset(known[False]), rest
@@ -106,14 +106,12 @@ class Operators:
     that speak of the joint step, which `applicable` leaves out.
     """
 
-    def __init__(
-        self, actions: Sequence[GroundAction | None], codec: StateCodec, evaluator: Evaluator
-    ) -> None:
-        self._codec, self._evaluator = codec, evaluator
+    def __init__(self, actions: Sequence[GroundAction | None], evaluator: Evaluator) -> None:
+        self._evaluator, self._codec = evaluator, evaluator.codec
         self._state_formulas: dict[int, list[Formula]] = {}
         self.step_formulas: dict[int, list[Formula]] = {}
         self.conditional: dict[int, list[Effect]] = {}
-        self.adds = np.zeros((len(actions), codec.fact_blocks), np.uint64)
+        self.adds = np.zeros((len(actions), self._codec.fact_blocks), np.uint64)
         self.deletes = np.zeros_like(self.adds)
         self._required, self._forbidden = np.zeros_like(self.adds), np.zeros_like(self.adds)
         required = [self._enter(number, action) for number, action in enumerate(actions)]
@@ -125,14 +123,14 @@ class Operators:
             self._facts[number, : len(facts)] = sorted(facts, key=lambda f: (frequency[f], f))
         # By their first fact, CSR; those without any are first.
         self._by_fact = np.argsort(self._facts[:, 0], kind="stable")
-        bounds = np.arange(-1, 64 * codec.fact_blocks + 1)
+        bounds = np.arange(-1, 64 * self._codec.fact_blocks + 1)
         self._first = np.searchsorted(self._facts[self._by_fact, 0], bounds)
 
     def _enter(self, number: int, action: GroundAction | None) -> frozenset[int]:
         """Enter what an action needs and does; the facts that it requires."""
         if action is None:
             return frozenset()
-        required, forbidden, rest = split_condition(action.precondition, self._evaluator)
+        required, forbidden, rest = split_condition(action.precondition, self._codec.facts)
         self._required[number] = self._codec.mask(required)
         self._forbidden[number] = self._codec.mask(forbidden)
         for formula in rest:

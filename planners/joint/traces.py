@@ -43,7 +43,7 @@ class Event:
 
 
 class Traces:
-    """The events of a model's joint steps, in order.
+    """The events of a model's joint steps, in order; its states remember no actions.
 
     ``interfering``: for robots ``i`` and ``j`` a table (labels of i, labels of j).  ``has_ties``:
     whether blocks of a step that was looked at could be done in another order: then the order of
@@ -76,20 +76,15 @@ class Traces:
 
         True of joint actions: they are no subactions.
         """
-        facts = self._model.codec.facts_part(row[None, :])[0]
-        return self._stepper is None or self._stepper.allows(facts, step)
+        return self._stepper is None or self._stepper.allows(row, step)
 
     def _made(self, row: Rows, step: Step) -> Rows | None:
-        model, facts = self._model, self._model.codec.facts_part(row[None, :])
-        if self._stepper is not None and self._stepper.is_fixed(step) and not model.remembers:
+        if self._stepper is not None and self._stepper.is_fixed(step):
             return self._stepper.fixed_step(row, step)
         only = [(np.array([0, 1]), np.array([label])) for label in step]
-        found = model.stepper.steps(facts, only)
+        found = self._model.stepper.steps(row[None, :], only)
         mine = np.flatnonzero((found.labels == step).all(axis=1))  # joint actions heed no choices
-        result = found.result[mine]
-        if model.remembers:
-            result = model.codec.remembering(result, found.labels[mine])
-        return result[0] if len(mine) else None
+        return found.result[mine[0]] if len(mine) else None
 
     def follow(self, row: Rows, steps: Sequence[Step]) -> Rows | None:
         """Where joint steps one after another lead; None if one cannot be taken."""
@@ -176,7 +171,7 @@ class Traces:
             if action := own[label]:
                 touched = footprint(action).touched
                 known = [codec.facts.index[atom] for atom in touched if atom in codec.facts]
-                found[: codec.fact_blocks] |= codec.mask(known)
+                found |= codec.mask(known)
         return found
 
     def _groups(self, step: Step) -> tuple[Block, ...]:

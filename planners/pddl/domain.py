@@ -260,8 +260,7 @@ def _agent_clause(fields: Mapping[str, _Items]) -> _Items | None:
     if len(clause) == 1 and isinstance(clause[0], Group):
         clause = clause[0].items
     if len(clause) > 1 and not is_token(clause[1], "-"):
-        what = "expected '- TYPE' or nothing after the agent's variable"
-        raise clause[1].fail(what, _AGENT_FORM)
+        raise clause[1].fail("expected '- TYPE' or nothing after the agent's variable", _AGENT_FORM)
     return clause
 
 

@@ -22,7 +22,7 @@ from planners.pddl.lifted import And, Atom, Constraint, Domain, Effect, Problem,
 from planners.pddl.problem import read_problem
 from planners.pddl.robots import objects_of
 from planners.pddl.sexpr import Source, read_source
-from planners.system.errors import BadInput, Position
+from planners.system.errors import Position
 from planners.system.limits import reaching
 from planners.system.messages import echoed
 
@@ -42,17 +42,14 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
     folder = Path(directory)
     if not folder.is_dir():
         what = "this is a file, not a folder" if folder.exists() else "there is no such folder"
-        raise BadInput(
-            what, position=Position(str(directory)), remedy="Name the folder of the robots' files."
-        )
+        raise Position(str(directory)).fail(what, "Name the folder of the robots' files.")
     domains, problems = _files(folder, "domain"), _files(folder, "problem")
     if not domains or set(domains) != set(problems):
         odd = ", ".join(sorted(set(domains) ^ set(problems))) or "no such files"
-        raise BadInput(
+        raise Position(str(directory)).fail(
             "expected domain-ROBOT.pddl and problem-ROBOT.pddl (or ROBOT_domain.pddl and "
             f"ROBOT_problem.pddl) for every robot; without a partner: {odd}",
-            position=Position(str(directory)),
-            remedy="Unfactored files are given as DOMAIN PROBLEM, without --factored.",
+            "Unfactored files are given as DOMAIN PROBLEM, without --factored.",
         )
     with reaching(lambda: f"reading {directory}", "shorter files"):
         read = parse_domains([*map(read_source, domains.values())])
@@ -75,10 +72,9 @@ def _files(folder: Path, kind: str) -> dict[str, Path]:
         if not robot or len(path.stem) - len(robot) != len(kind) + 1:
             continue
         if robot in found:
-            raise BadInput(
+            raise Position(str(folder)).fail(
                 f"two {kind} files of robot {echoed(robot)}: {found[robot].name} and {path.name}",
-                position=Position(str(folder)),
-                remedy="Remove one of them.",
+                "Remove one of them.",
             )
         found[robot] = path
     return found
@@ -87,10 +83,9 @@ def _files(folder: Path, kind: str) -> dict[str, Path]:
 def _of_robot(robot: str, domain: Domain, problem: Problem) -> Domain:
     """The robot's domain with its own parameter in every action marked as the agent."""
     if robot not in problem.objects:
-        raise BadInput(
+        raise problem.source.section(":objects").fail(
             f"robot {echoed(robot)} of the file name is no object of its problem",
-            position=problem.source.section(":objects"),
-            remedy="A robot's files have its name, and its problem declares it.",
+            "A robot's files have its name, and its problem declares it.",
         )
     schemas = tuple(replace(s, agent=_agent(robot, s, domain, problem)) for s in domain.schemas)
     return replace(domain, schemas=schemas)
@@ -100,10 +95,9 @@ def _agent(robot: str, schema: Schema, domain: Domain, problem: Problem) -> int:
     for number, parameter in enumerate(schema.parameters):
         if objects_of(domain, problem, parameter.types) == (robot,):
             return number
-    raise BadInput(
+    raise schema.position.fail(
         f"action {echoed(schema.name)} has no parameter that can only be {echoed(robot)}",
-        position=schema.position,
-        remedy="Give the robot a type of its own and a parameter of this type.",
+        "Give the robot a type of its own and a parameter of this type.",
     )
 
 
@@ -112,19 +106,17 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
     schemas: dict[str, Schema] = {}
     for domain in domains:
         if domain.name != first.name:
-            raise BadInput(
+            raise domain.source.section("domain").fail(
                 f"domain {echoed(domain.name)}, expected {echoed(first.name)}",
-                position=domain.source.section("domain"),
-                remedy="All files of a folder belong to one domain.",
+                "All files of a folder belong to one domain.",
             )
         for schema in domain.schemas:
             known = schemas.setdefault(schema.name, schema)
             if _without_agent(known) != _without_agent(schema):
-                raise BadInput(
+                raise schema.position.fail(
                     f"action {echoed(schema.name)} differs between the robots' files in more than "
                     "the agent's name and type",
-                    position=schema.position,
-                    remedy=f"The other one is at {known.position}. Give different actions "
+                    f"The other one is at {known.position}. Give different actions "
                     "different names.",
                 )
             schemas[schema.name] = _with_types(known, _both(_agent_of(known), _agent_of(schema)))
@@ -148,11 +140,10 @@ def _join_constraints(domains: Sequence[Domain]) -> tuple[Constraint, ...]:
         for own in domain.constraints:
             known = joined.setdefault(own.name, own)
             if replace(known, actions=own.actions) != own:
-                raise BadInput(
+                raise domain.source.section(":concurrency-constraint").fail(
                     f"the constraint {echoed(own.name)} differs between the robots' files in more "
                     "than its actions",
-                    position=domain.source.section(":concurrency-constraint"),
-                    remedy="Write the same :parameters and :bounds, or give it another name.",
+                    "Write the same :parameters and :bounds, or give it another name.",
                 )
             joined[own.name] = replace(own, actions=_both(known.actions, own.actions))
     return tuple(joined.values())
@@ -205,11 +196,10 @@ def _require_owners(domain: Domain, problem: Problem, views: Mapping[str, Domain
         agents = objects_of(domain, problem, _agent_of(schema))
         for robot, other in views.items():
             if robot in agents and all(s.name != schema.name for s in other.schemas):
-                raise BadInput(
+                raise schema.position.fail(
                     f"action {echoed(schema.name)} is for agents such as {echoed(robot)}, "
                     f"whose own domain {other.source.name} does not have it",
-                    position=schema.position,
-                    remedy="Give robots with different actions different types.",
+                    "Give robots with different actions different types.",
                 )
 
 
@@ -252,9 +242,8 @@ def _agreed(what: str, tables: Iterable[tuple[Problem, Mapping[K, V]]]) -> dict[
         for key, value in table.items():
             if merged.setdefault(key, value) != value:
                 text = label(key.predicate, key.args) if isinstance(key, Atom) else echoed(key)
-                raise BadInput(
+                raise problem.source.section(":objects" if what == "object" else ":init").fail(
                     f"the {what} {text} is not the same in all robots' problems",
-                    position=problem.source.section(":objects" if what == "object" else ":init"),
-                    remedy="Give it one type, or one value, in all of them.",
+                    "Give it one type, or one value, in all of them.",
                 )
     return merged

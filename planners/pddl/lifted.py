@@ -134,9 +134,9 @@ class Schema:
     agent: int | None
     precondition: Formula
     effects: tuple[Effect, ...]
-    parts: tuple[Part, ...] = ()
-    cost: int | Atom | None = None
-    position: Position | None = field(default=None, compare=False)
+    parts: tuple[Part, ...]
+    cost: int | Atom | None
+    position: Position = field(compare=False)
 
     @property
     def acting(self) -> Variable | None:

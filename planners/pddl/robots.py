@@ -90,10 +90,9 @@ def find_team(domain: Domain, problem: Problem, choice: ModelOptions) -> Team:
         choice = replace(choice, robots=sorted({*choice.names} - {ENVIRONMENT}, key=natural))
     robots, by = _found(domain, problem, choice)
     if not robots:
-        raise BadInput(
+        raise problem.source.section(":objects").fail(
             "there is no robot in this problem",
-            position=problem.source.section(":objects"),
-            remedy=f"Robots are found by {by}; declare at least one such object.",
+            f"Robots are found by {by}; declare at least one such object.",
         )
     unowned = choice.unowned
     if all(s.agent is not None or s.parts for s in domain.schemas):
@@ -116,13 +115,12 @@ def _found(domain: Domain, problem: Problem, choice: ModelOptions) -> tuple[tupl
         _require_agreement(kinds, choice, *declared)
         return declared
     if choice.names:
-        if missing := [name for name in choice.names if name not in problem.objects]:
-            name = missing[0]
+        for name in (own for own in choice.names if own not in problem.objects):
             remedy = f"Objects: {', '.join(sorted(problem.objects, key=natural))}."
             if not choice.recorded:
                 raise UsageError(f"--robots: there is no object {echoed(name)}", remedy=remedy)
             what = f"the language file's robot {echoed(name)} is no object of the problem"
-            raise BadInput(what, position=problem.source.section(":objects"), remedy=remedy)
+            raise problem.source.section(":objects").fail(what, remedy)
         return tuple(sorted(set(choice.names), key=natural)), "--robots"
     if choice.robot_type:
         robots = kinds.of(choice.robot_type)
@@ -147,7 +145,7 @@ def _require_agreement(
     remedy = f"The robots are {', '.join(robots)} (by {by})."
     if choice.recorded:
         what = f"the language file's robots {', '.join(choice.names)} contradict the domain"
-        raise BadInput(what, position=kinds.problem.source.section(":objects"), remedy=remedy)
+        raise kinds.problem.source.section(":objects").fail(what, remedy)
     raise UsageError(f"{said} contradicts the domain", remedy=remedy)
 
 
@@ -220,10 +218,9 @@ class _Kinds:
     def unclear(self, why: str, candidates: Sequence[str]) -> BadInput:
         """The error for robots that cannot be told, with the candidates and their objects."""
         listed = "; ".join(f"{kind} ({some(self.of(kind), _SHOWN)})" for kind in candidates)
-        return BadInput(
+        return self.domain.source.section(":types").fail(
             f"which objects are the robots? {why}",
-            position=self.domain.source.section(":types"),
-            remedy="Say --robot-type TYPE or --robots NAME,NAME."
+            "Say --robot-type TYPE or --robots NAME,NAME."
             + (f" Candidates: {listed}." if listed else ""),
         )
 

@@ -130,7 +130,7 @@ class _Placed:
 
     def fail(self, what: str, remedy: str = _COMPARE) -> BadInput:
         """An error that points here."""
-        return BadInput(what, position=self.position, remedy=remedy)
+        return self.position.fail(what, remedy)
 
     def unsupported(self, feature: str, remedy: str = _CLASSICAL) -> Unsupported:
         """The error for what PDDL has and coordlang has not."""
@@ -204,8 +204,7 @@ def _with_old_comments(data: bytes, name: str) -> str:
     Bytes there that are not UTF-8 are read as Latin-1.  Raises `BadInput` for such bytes elsewhere.
     """
     if b"\0" in data:
-        what = "this is a binary file, not PDDL text"
-        raise BadInput(what, position=Position(name), remedy=_NO_PDDL)
+        raise Position(name).fail("this is a binary file, not PDDL text", _NO_PDDL)
     # Such a byte b is chr(0xdc00 + b) here, so that it comes back as it was.
     text = data.decode("utf-8-sig", "surrogateescape")
     for match in _TOKEN.finditer(text):
@@ -245,8 +244,7 @@ def parse(source: Source) -> Group:
         raise _unclosed(source, lists[1:])
     top = lists[0][1]
     if not top:
-        what = "expected '(define ...', found an empty file"
-        raise BadInput(what, position=Position(source.name), remedy=_NO_PDDL)
+        raise Position(source.name).fail("expected '(define ...', found an empty file", _NO_PDDL)
     return top[0].group("a list")
 
 

@@ -50,13 +50,13 @@ class FactsOf(NamedTuple):
     def of(cls, model: JointModel, action: GroundAction) -> FactsOf:
         """Those of an action; facts that are never true are left out."""
         adds, deletes, conditional = split_effects(action, model.codec.facts)
-        index, evaluator = model.codec.facts.index, model.evaluator
+        facts = model.codec.facts
         return cls(
-            split_condition(action.precondition, evaluator)[0],
+            split_condition(action.precondition, facts)[0],
             frozenset(adds),
             frozenset(deletes).difference(adds),
             tuple(
-                (split_condition(e.condition, evaluator)[0], index[e.atom], e.adds)
+                (split_condition(e.condition, facts)[0], facts.index[e.atom], e.adds)
                 for e in conditional
             ),
         )

@@ -175,11 +175,7 @@ def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
         return [_from_ipc(text, model, str(path))]
     if plans := _from_json(text, model, position):
         return plans
-    raise BadInput(
-        "there is no plan in it",
-        position=position,
-        remedy="`coordlang plans DOMAIN PROBLEM` writes plans.",
-    )
+    raise position.fail("there is no plan in it", "`coordlang plans DOMAIN PROBLEM` writes plans.")
 
 
 def only_one_plan(text: str, position: Position) -> None:
@@ -202,10 +198,9 @@ def only_one_plan(text: str, position: Position) -> None:
         elif numbers and _END.match(raw):
             ended = True
         if second:
-            raise BadInput(
+            raise Position(position.file, line, 1).fail(
                 "this file holds several plans: a second one begins here",
-                position=Position(position.file, line, 1),
-                remedy="Write one plan a file (`coordlang plans --max 1`), or use the JSON form.",
+                "Write one plan a file (`coordlang plans --max 1`), or use the JSON form.",
             )
 
 
@@ -221,11 +216,10 @@ def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[T
     file = PLANS.decode(text.encode(), position)
     robots = model.robots if file.robots is None else file.robots
     if sorted(robots) != sorted(model.robots):
-        raise BadInput(
+        raise position.fail(
             f"the robots of these plans are {echoed(', '.join(robots))}, not "
             f"{', '.join(model.robots)}",
-            position=position,
-            remedy="Give plans of this task, with the order of its robots.",
+            "Give plans of this task, with the order of its robots.",
         )
     for plan in file.plans:
         for number, step in enumerate(plan.actions):
@@ -265,19 +259,16 @@ def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
             continue
         match = _LINE.match(line)
         if match is None:
-            raise BadInput(
+            raise Position(name, number, 1).fail(
                 f"expected '0: (action args)', found {echoed(raw.strip())}",
-                position=Position(name, number, 1),
-                remedy="`coordlang plans DOMAIN PROBLEM` writes plans in this form.",
+                "`coordlang plans DOMAIN PROBLEM` writes plans in this form.",
             )
         action = "(" + " ".join(match["action"][1:-1].split()) + ")"
         step = int(match["step"][-8:]) if match["step"] else max(steps, default=-1) + 1
         if match["step"] and (len(match["step"]) > 8 or step > _MOST_STEPS):
-            raise BadInput(
+            raise Position(name, number, 1).fail(
                 f"step {match['step'][:20]} is too many steps",
-                position=Position(name, number, 1),
-                remedy="Steps are counted from 0, one number for all that "
-                "happens at the same time.",
+                "Steps are counted from 0, one number for all that happens at the same time.",
             )
         _put(steps, step, action, model, Position(name, number, 1))
     idle = (None,) * len(model.robots)
@@ -299,10 +290,9 @@ def _put(
         )
     if model.is_joint_action:
         if step in steps:
-            raise BadInput(
+            raise position.fail(
                 f"two joint actions in one step: {action} is the second",
-                position=position,
-                remedy="Each line of a joint-action plan is a step of its own.",
+                "Each line of a joint-action plan is a step of its own.",
             )
         steps[step] = whole = WholeStep(ground.parts)
         whole.action = ground
@@ -310,10 +300,9 @@ def _put(
     own = [*steps.get(step, (None,) * len(model.robots))]
     for robot in ground.owners:
         if own[robot] is not None:
-            raise BadInput(
+            raise position.fail(
                 f"{model.robots[robot]} does two things in one step: {own[robot]} and {action}",
-                position=position,
-                remedy="Give one of them another step number.",
+                "Give one of them another step number.",
             )
         own[robot] = action
     steps[step] = tuple(own)

@@ -27,6 +27,10 @@ class Position:
         file = sentence(self.file)
         return f"{file}:{self.line}:{self.column}" if self.line else file
 
+    def fail(self, what: str, remedy: str) -> BadInput:
+        """The error of what is wrong there; the caller raises it."""
+        return BadInput(what, position=self, remedy=remedy)
+
 
 class CoordlangError(Exception):
     """Base of all errors that a user may cause: what was wrong, where, and what to do about it.

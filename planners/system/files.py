@@ -63,26 +63,21 @@ class FileFormat(Generic[T]):
         try:
             head = msgspec.json.decode(data, type=_head())
             if self.format is not None and head.format != self.format:
-                what = f"format {echoed(head.format)}, expected {self.format!r}"
-                raise BadInput(what, position=position, remedy=see)
+                raise position.fail(f"format {echoed(head.format)}, expected {self.format!r}", see)
             is_known = head.version == self.version and not isinstance(head.version, bool)
             if self.format is not None and not is_known:
-                raise BadInput(
+                raise position.fail(
                     f"{self.title} version {echoed(head.version)}; "
                     f"this program reads version {self.version}",
-                    position=position,
-                    remedy="Use the version of coordlang that wrote it, or write it again "
-                    "with this one.",
+                    "Use the version of coordlang that wrote it, or write it again with this one.",
                 )
             return msgspec.json.decode(data, type=self.record)
         except msgspec.ValidationError as error:
-            what = f"this is no {self.title}: {error}"
-            raise BadInput(what, position=position, remedy=see) from None
+            raise position.fail(f"this is no {self.title}: {error}", see) from None
         except (msgspec.DecodeError, RecursionError) as error:
-            raise BadInput(
+            raise position.fail(
                 f"this is no JSON, or it is cut off: {error}",
-                position=position,
-                remedy="Write or copy the file again; an editor that checks JSON shows the place.",
+                "Write or copy the file again; an editor that checks JSON shows the place.",
             ) from None
 
     def json_schema(self) -> dict[str, Any]:
@@ -139,10 +134,9 @@ def read_bytes(path: str | PathLike[str], *, most: int = MAX_TEXT) -> bytes:
         _require_size(size, most, position)
         return GzipFile(fileobj=BytesIO(data)).read(size)
     except (OSError, EOFError, zlib.error) as error:
-        raise BadInput(
+        raise position.fail(
             f"cannot be read: {error}",
-            position=position,
-            remedy="Its compression (gzip) is damaged: copy or write the file again.",
+            "Its compression (gzip) is damaged: copy or write the file again.",
         ) from None
 
 
@@ -158,16 +152,13 @@ def read_stored_bytes(path: str | PathLike[str], *, most: int = MAX_TEXT) -> byt
             with open(path, "rb") as file:
                 data = b"".join(_pieces(file.read, most))
     except FileNotFoundError:
-        raise BadInput(
+        raise position.fail(
             "there is no such file",
-            position=position,
-            remedy="Check the name and the folder; relative names start at the working directory.",
+            "Check the name and the folder; relative names start at the working directory.",
         ) from None
     except OSError as error:
-        raise BadInput(
-            f"cannot be read: {error.strerror or error}",
-            position=position,
-            remedy="Name a file that you may read.",
+        raise position.fail(
+            f"cannot be read: {error.strerror or error}", "Name a file that you may read."
         ) from None
     _require_size(len(data), most, position)
     return data
@@ -184,13 +175,13 @@ def names_format(data: bytes, name: str) -> bool:
     return False
 
 
-def read_text(path: str | PathLike[str]) -> str:
+def read_text(path: str | PathLike[str], *, most: int = MAX_TEXT) -> str:
     """Read a text in UTF-8, or standard input for ``-``.
 
-    Raises `BadInput` for a file that is missing or cannot be read, or that is not UTF-8, with the
-    byte that is not.
+    Raises `BadInput` for a file that is missing, cannot be read, or holds more than ``most`` bytes,
+    or that is not UTF-8, with the byte that is not.
     """
-    data = read_bytes(path)
+    data = read_bytes(path, most=most)
     check_utf8(data, Position(str(path)))
     return data.decode("utf-8-sig")
 
@@ -206,10 +197,9 @@ def check_utf8(data: bytes, position: Position) -> None:
 
 def not_utf8(data: bytes, offset: int, position: Position) -> BadInput:
     """The error for a byte that no UTF-8 text has there (the caller raises it)."""
-    return BadInput(
+    return position.fail(
         f"this is no UTF-8 text: byte 0x{data[offset]:02x} at offset {offset}",
-        position=position,
-        remedy="Save the file in UTF-8.",
+        "Save the file in UTF-8.",
     )
 
 
@@ -221,10 +211,9 @@ def require_seen(name: str, position: Position, what: str = "name") -> None:
     """
     found = re.search(UNSEEN, name)
     if found is not None:
-        raise BadInput(
+        raise position.fail(
             f"the {what} {echoed(name)} holds the character U+{ord(found[0]):04X}",
-            position=position,
-            remedy="Names and words hold no control characters and none that cannot be seen.",
+            "Names and words hold no control characters and none that cannot be seen.",
         )
 
 
@@ -238,10 +227,9 @@ def _pieces(read: Callable[[int], bytes], most: int) -> Iterator[bytes]:
 
 def _require_size(size: int, most: int, position: Position) -> None:
     if size > most:
-        raise BadInput(
+        raise position.fail(
             f"the file holds more than {most / 2**20:,.0f} MiB of text",
-            position=position,
-            remedy="No file of coordlang is as large: is it the right one?",
+            "No file of coordlang is as large: is it the right one?",
         )
     if size > _SMALL and size * _READING > (left := memory_left()):
         raise OutOfMemory(

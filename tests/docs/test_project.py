@@ -103,8 +103,9 @@ def errors() -> dict[str, bool]:
 def calls(path: Path) -> Iterator[ast.Call]:
     """The calls that make an error of the tree."""
     for node in nodes(path):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            if errors().get(node.func.id) is False:
+        if isinstance(node, ast.Call):
+            made = ast.unparse(node.func)
+            if errors().get(made) is False or made.endswith(".fail"):
                 yield node
         elif isinstance(node, ast.ClassDef) and errors().get(node.name) and node.name != BASE:
             for inner in ast.walk(node):
@@ -114,7 +115,8 @@ def calls(path: Path) -> Iterator[ast.Call]:
 
 def lacks_remedy(call: ast.Call) -> bool:
     given = {keyword.arg: keyword.value for keyword in call.keywords}
-    remedy = given.get("remedy", ast.Constant(None))
+    by_place = call.args[1:] if ast.unparse(call.func).endswith(".fail") else []
+    remedy = given.get("remedy", next(iter((*by_place, ast.Constant(None)))))
     return None not in given and ast.unparse(remedy) == "None"  # None: **keywords
 
 
