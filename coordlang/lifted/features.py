@@ -76,10 +76,6 @@ class Expression:
                 return role.complexity + concept.complexity
         return 1 + sum(part.complexity for part in self.parts if isinstance(part, Expression))
 
-    def __call__(self, states: States) -> Any:
-        """Its values: one for each state, or for each state and object."""
-        raise NotImplementedError
-
 
 # ---- concepts
 

@@ -91,11 +91,6 @@ class Translated:
     agents: dict[str, Any]
     types: dict[str, str]
 
-    @property
-    def texts(self) -> tuple[str, str]:
-        """Domain and problem as PDDL text."""
-        return self.domain.source.text, self.problem.source.text
-
 
 def translate(
     problem: Any, subactions: Subactions | None = None, concurrency: Concurrency | None = None
@@ -213,10 +208,7 @@ class _Writer:
         self.root = min(roots) if is_root else None
         #: The type of all agents, by which formulas of the user name it.
         self.agent_type = self.names.of("type", None, "agent") if self.agents else ""
-        self.name_things()
-
-    def name_things(self) -> None:
-        """Name types, objects and agents first, so that their names are kept where possible."""
+        # Types, objects and agents are named first, so that their names are kept where possible.
         for t in self.problem.user_types:
             self.type_name(t)
         if self.concurrency:  # its formulas name actions, not fluents that are called so

@@ -232,13 +232,10 @@ class _SelectThenApply:
         self._first_work = (*facts, self._first)[0]
         #: Whether a robot before the last one may leave something to do.
         self._leaves = any(robot + 1 < len(team.names) for _, robot in order)
-        self._prepare_end()
-
-    def _prepare_end(self) -> None:
-        marks = {action.mark for action in self._all if action.mark is not None}
+        marks = {action.mark for action in actions if action.mark is not None}
         #: What is true between two steps, false once something is selected, and restored.
         self._restored = marks | {self._none_left(*one) for one in self._stages}
-        last = sum(action.robot == len(self._team.names) - 1 for action in self._all)
+        last = sum(action.robot == len(team.names) - 1 for action in actions)
         self._tidies = last * len(marks) > _MANY
         if self._tidies:
             self.out.action("end the step", {_TIDY: True}, {self._first} | self._restored, {_TIDY})
@@ -392,21 +389,17 @@ class _SelectThenApply:
     def _perform(self, action: StagedAction, here: Atom, after: Atom, *, early: bool) -> None:
         """The effects of a selected action: only the early deletes, or all the rest."""
 
-        def part(adds: set[Atom], deletes: set[Atom]) -> tuple[set[Atom], set[Atom]]:
+        def part(of: Atom, adds: set[Atom], deletes: set[Atom]) -> tuple[set[Atom], set[Atom]]:
             if early:
                 return set(), deletes & action.early
-            return set(adds), deletes - action.early - action.adds
+            return adds, deletes - action.early - action.adds | {of}
 
         name = f"{'undo' if early else 'apply'} {action.label}"
-        adds, deletes = part(action.adds, action.deletes)
         end = self.out.phase() if action.groups else after
-        done = set() if early else {action.selected}
-        self._lead(name, {action.selected: True}, here, end, adds, deletes | done)
+        own = part(action.selected, action.adds, action.deletes)
+        self._lead(name, {action.selected: True}, here, end, *own)
         for k, (_, effects) in enumerate(action.groups):
             here, end = end, after if k + 1 == len(action.groups) else self.out.phase()
-            adds, deletes = part(*effects)
             fires = action.fires(k)
-            done = set() if early else {fires}
-            fired = f"{name} fired {k}"
-            self._lead(fired, {fires: True}, here, end, adds, deletes | done)
+            self._lead(f"{name} fired {k}", {fires: True}, here, end, *part(fires, *effects))
             self._lead(f"{name} not fired {k}", {fires: False}, here, end)

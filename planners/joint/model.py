@@ -258,10 +258,6 @@ class JointModel:
         """The row of an initial state: the fluents among ``atoms`` (statics are left out)."""
         return self.codec.encode(sorted(show(a) for a in atoms if a not in self.statics))
 
-    def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
-        """See `Stepper.joint_action`."""
-        return self.stepper.joint_action(self.codec.facts_part(row), labels)
-
     def state_text(self, row: Rows) -> str:
         """A state for people: its key, if it is not empty."""
         return self.codec.key(row) or NO_FACT

@@ -135,7 +135,7 @@ def numbered_actions(plans: Plans, plan: Plan, steps: Plan) -> Iterator[tuple[in
     """
     model, rows = plans.space.model.in_step, plans.space.rows
     for number, (state, labels) in enumerate(zip(plans.states(plan), steps, strict=False)):
-        whole = model.joint_action(rows[state], labels)
+        whole = model.stepper.joint_action(model.codec.facts_part(rows[state]), labels)
         own = model.texts(labels) if whole is None else (whole,)
         yield from ((number, text) for text in dict.fromkeys(own) if text is not None)
 
