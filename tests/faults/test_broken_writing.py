@@ -143,9 +143,7 @@ class FullDisk:
         elif event not in ("os.rename", "os.mkdir", "os.link", "os.symlink"):
             return
         path = arguments[0]
-        if isinstance(path, (str, bytes)) and os.path.abspath(os.fsdecode(path)).startswith(
-            self.folder
-        ):
+        if isinstance(path, (str, bytes)) and self.folder in os.path.abspath(os.fsdecode(path)):
             self.change(needs_space=event != "os.rename")
 
     def change(self, *, needs_space: bool = True) -> None:
