@@ -58,10 +58,9 @@ class _UnixBus:
         self._folder, self._robot, self._own = folder, robot, folder / _quoted(robot)
         self._lock, self._socket = self._entered()
 
-    def _entered(self) -> tuple[IO[str], socket.socket]:
-        """The robot's lock and its socket in the folder."""
-        own = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        own.setblocking(False)
+    def _entered(self, tries: int = 9) -> tuple[IO[str], socket.socket]:
+        """The robot's lock and its socket in the folder, which may be removed meanwhile."""
+        own = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         try:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if self._folder.stat().st_uid != os.getuid():
@@ -74,6 +73,8 @@ class _UnixBus:
             remedy = "End that process, or name another folder with --bus unix:FOLDER."
             raise UsageError(f"{self._robot} is on this bus already", remedy=remedy) from None
         except OSError as error:  # of a path that is too long for a socket, too
+            if isinstance(error, FileNotFoundError | FileExistsError) and tries > 1:
+                return self._entered(tries - 1)
             what = f"--bus unix:{self._folder} cannot be opened: {error.strerror or error}"
             raise UsageError(what, remedy="Name a short path to a folder of yours.") from None
         return lock, own
@@ -117,9 +118,7 @@ class _ZenohBus:
             raise UsageError("--bus zenoh: eclipse-zenoh is not installed", remedy=remedy) from None
         self._prefix = f"coordlang/{run}"
         self._come: SimpleQueue[bytes] = SimpleQueue()
-        self._bell, self._rung = socket.socketpair()
-        self._bell.setblocking(False)
-        self._rung.setblocking(False)
+        self._bell, self._rung = socket.socketpair(type=socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
         try:
             if config:
                 settings = zenoh.Config.from_file(config)
