@@ -139,7 +139,7 @@ class Scene {
     if (!this.tokens.has(thing)) {
       const robot = thing < DATA.robots.length, text = cut(name, robot ? 5 : 6);
       const shape = robot ? draw('circle', { r: 27 }) : draw('rect', { x: -26, y: -19, width: 52, height: 38, rx: 6 });
-      const size = Math.min(23, 84 / Math.max(text.length, 2));
+      const size = Math.min(23, 68 / Math.max(text.length, 2));
       this.tokens.set(thing, this.layers.tokens.appendChild(draw('g', { class: `token ${this.paint(thing)}`, 'data-thing': name },
         draw('title', {}, name), shape, draw('text', { y: size * .35, 'font-size': size }, text))));
     }
