@@ -2,20 +2,16 @@
 
 const CELL = 100;
 
-function mapGeometry() {
+// share: the part of the places whose boxes touch none, where the map would be too wide if no boxes touched.
+function mapGeometry(share = .5) {
   const { places, grid } = DATA;
   const width = grid ? CELL - 6 : 124, height = grid ? CELL - 6 : 88;
-  let scale = CELL;
-  if (!grid) {
-    scale = 150;
-    for (let a = 0; a < places.length; a++) {
-      for (let b = 0; b < a; b++) {
-        const dx = Math.abs(places[a].x - places[b].x) / 150, dy = Math.abs(places[a].y - places[b].y) / 124;
-        scale = Math.max(scale, Math.min(420, 1 / Math.max(dx, dy, 1e-6)));
-      }
-    }
-  }
-  const left = Math.min(...places.map(p => p.x)), top = Math.min(...places.map(p => p.y));
+  const [left, right] = [Math.min, Math.max].map(least => least(...places.map(p => p.x))), top = Math.min(...places.map(p => p.y));
+  // From these scales on a place's box touches none.
+  const apart = (grid ? [] : places).map(a => Math.max(...places.map(b => (a === b ? 0
+    : Math.min(420, 1 / Math.max(Math.abs(a.x - b.x) / 150, Math.abs(a.y - b.y) / 124, 1e-6)))))).sort((a, b) => a - b);
+  const fits = Math.max(1600 / (right - left), apart[Math.floor((apart.length - 1) * share)]);
+  const scale = grid ? CELL : Math.min(fits, Math.max(150, apart.at(-1)));
   const centre = places.map(p => [(p.x - left) * scale + width / 2 + 8, (p.y - top) * scale + height / 2 + 8]);
   return { width, height, centre,
     size: [Math.max(...centre.map(c => c[0])) + width / 2 + 8, Math.max(...centre.map(c => c[1])) + height / 2 + 8] };

@@ -35,7 +35,7 @@ class Atlas {
   }
 
   nested() {
-    const { centre, size, width, height } = mapGeometry(), [one, two] = this.pair;
+    const { centre, size, width, height } = mapGeometry(1), [one, two] = this.pair;
     const inner = Math.min((width - 6) / size[0], (height - (DATA.grid ? 6 : 20)) / size[1]);
     const svg = draw('svg', { viewBox: `0 0 ${size[0]} ${size[1]}`, role: 'img', 'aria-label':
       `For every place of ${DATA.things[one]} a small map; its cells are coloured by the word when ${DATA.things[two]} is there` });
