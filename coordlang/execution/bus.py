@@ -128,7 +128,8 @@ class _ZenohBus:
         except zenoh.ZError as error:
             # Zenoh's messages end with a line of its source.
             what = f"--bus zenoh:{config} cannot be opened: {str(error).partition(' at /')[0]}"
-            raise BadInput(what, remedy="See docs/robots.md, A bus.") from None
+            remedy = "Give zenoh:CONFIG with free ports: docs/robots.md, A bus."
+            raise BadInput(what, remedy=remedy) from None
         self._session.declare_subscriber(f"{self._prefix}/{_quoted(robot)}", self._comes)
 
     def _comes(self, sample: Any) -> None:

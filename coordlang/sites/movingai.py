@@ -14,7 +14,7 @@ from coordlang.sites import shipped_domains
 from planners.pddl.pddl_text import named_like
 from planners.system.errors import BadInput, Position
 from planners.system.files import read_bytes
-from planners.system.messages import echoed
+from planners.system.messages import counted, echoed
 
 #: The characters of a map: ground, ground, swamp | out of bounds, out of bounds, trees, water.
 PASSABLE = ".GS"
@@ -97,7 +97,7 @@ def read_agents(path: Path, grid: MovingMap, agents: int) -> tuple[Agent, ...]:
         lines = lines[1:]
     if len(lines) < agents:
         fewer = f"Say --robots {len(lines)} or fewer."
-        what = f"this scenario has {len(lines):,} robots, and {agents:,} are asked for"
+        what = f"this scenario has {counted(len(lines), 'robot')}, and {agents:,} are asked for"
         raise _wrong(what, fewer if lines else f"Expected a line for each: {_COLUMNS}.", path)
     found: list[Agent] = []
     taken: dict[tuple[str, Cell], int] = {}

@@ -84,7 +84,7 @@ def test_a_name_that_pddl_does_not_have(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("agents", "change", "line", "message"),
     [
-        (["0 0 1 1"], ("", ""), "", "this scenario has 1 robots, and 2 are asked for"),
+        (["0 0 1 1"], ("", ""), "", "this scenario has 1 robot, and 2 are asked for"),
         ([], ("", ""), "", "this scenario has 0 robots"),
         (["0 0 1 1", "1 0 2 2"], ("", ""), ":3:1:", "the start is no passable cell .* x 1, y 0"),
         (["0 0 1 1", "2 2 3 2"], ("", ""), ":3:1:", "the goal is no passable cell .* x 3, y 2"),
