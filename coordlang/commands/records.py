@@ -97,13 +97,16 @@ class Limits:
         return int(min(size, sys.maxsize))
 
 
+#: Without methods that Python would write for each record at every start: 6 % of a short command.
+_as_dataclass = dataclass(init=False, eq=False, repr=False)
+
+
 @dataclass_transform(frozen_default=True)
-@dataclass(frozen=True, init=False, eq=False, repr=False)
 class CommandOptions:
     """What a command can be asked for; the docstring of each record is the command's ``--help``.
 
-    Each record that is made of this one is a frozen dataclass, too (`record_from` makes it, with
-    all its groups); they share one ``__init__``, as to write one for each delays every start.
+    Each record that is made of this one is a dataclass, too, which type checkers hold to be frozen;
+    `record_from` makes it, with all its groups.
 
     The command ``takes`` arguments as the usage line shows them, and none where the option
     ``alone`` is given.  A terminal shows what it is ``doing``.  Its ``name`` is the record's; its
@@ -130,7 +133,7 @@ class CommandOptions:
         own = cls.__name__.removesuffix("Options").lower()
         for key in {"name", "module", "function"} - vars(cls).keys():
             setattr(cls, key, own)
-        dataclass(frozen=True, init=False, eq=False, repr=False)(cls)
+        _as_dataclass(cls)
 
     def __init__(self, **given: Any) -> None:
         vars(self).update(given)
@@ -138,6 +141,9 @@ class CommandOptions:
 
     def __post_init__(self) -> None:
         """Refuse values that no command takes."""
+
+
+_as_dataclass(CommandOptions)
 
 
 def output_option(help: str, metavar: str = "FILE", default: Any = None, **more: Any) -> Any:
