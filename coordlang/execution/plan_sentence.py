@@ -73,7 +73,8 @@ def carried_out(
         steps = model.successors(rows[-1][None, :])
         found = (steps.labels == labels).all(axis=1).nonzero()[0]
         if not len(found):
-            return rows, second, model.stepper.why_not(rows[-1], labels)
+            facts = model.codec.facts_part(rows[-1])
+            return rows, second, model.stepper.why_not(facts, labels)
         rows.append(steps.result[found[0]])
         second += int(steps.cost[found[0]])
     return rows, second, None

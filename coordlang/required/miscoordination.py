@@ -249,7 +249,7 @@ def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
     steps = model.successors(row[None, :])
     same = np.flatnonzero((steps.labels == np.array(labels)).all(axis=1))
     if not len(same):
-        return model.stepper.why_not(row, labels)
+        return model.stepper.why_not(model.codec.facts_part(row), labels)
     goal = space.goals[space.goal[node]]
     left = int(space.layer[node]) - 1
     try:

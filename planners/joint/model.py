@@ -100,7 +100,8 @@ class Steps:
 class Stepper(ABC):
     """What composes joint steps, or reads whole ones: see `planners.joint.composition`.
 
-    What is not abstract is said of robots that neither do joint actions nor ever interfere.
+    Of states it is given the facts (`StateCodec.facts_part`), and not what robots did last.  What
+    is not abstract is said of robots that neither do joint actions nor ever interfere.
     """
 
     @abstractmethod
