@@ -74,14 +74,14 @@ def _write(files: Mapping[str | Path, bytes], outdated: str | Path | None = None
         for path in (devices := [*filter(is_device, files)]):
             remove_file(outdated)
             Path(path).write_bytes(files[path])
+        targets = {path: Path(os.path.realpath(path)) for path in files if path not in devices}
         with postponed_signals(), ExitStack() as written:
-            beside: dict[Path, Path] = {}
-            for path in (path for path in files if path not in devices):
-                target = Path(os.path.realpath(path))
-                beside[target] = written.enter_context(_written_beside(target, files[path]))
+            ready = {}
+            for path, target in targets.items():
+                ready[path] = written.enter_context(_written_beside(target, files[path]))
             written.enter_context(_set_aside(outdated))
-            for target, new in beside.items():
-                os.replace(new, target)
+            for path, beside in ready.items():
+                os.replace(beside, targets[path])
     except BrokenPipeError:
         raise
     except OSError as error:
