@@ -278,8 +278,9 @@ class _Grounder:
         negation under ``forall``: where one of them is false, the instance is no matter.  An action
         is one only if all else is static: literals beside it count, whether or not it is done.
         """
-        leaves = [leaf for leaf, _ in literals(f)]
-        signs = {sign for leaf, sign in literals(f) if isinstance(leaf, StepAtom)}
+        found = literals(f)
+        leaves = [leaf for leaf, _ in found]
+        signs = {sign for leaf, sign in found if isinstance(leaf, StepAtom)}
         names = tuple(sorted(term for term in _terms(leaves) if term.startswith("?")))
         part = f.part if isinstance(f, Exists) else negated(f.part)
         changing = {leaf for leaf in leaves if not self._is_static(leaf)}

@@ -6,7 +6,7 @@ const CELL = 100;
 function mapGeometry(share = .5) {
   const { places, grid } = DATA;
   const width = grid ? CELL - 6 : 124, height = grid ? CELL - 6 : 88;
-  const [left, right] = [Math.min, Math.max].map(least => least(...places.map(p => p.x))), top = Math.min(...places.map(p => p.y));
+  const [left, right] = [Math.min, Math.max].map(end => end(...places.map(p => p.x))), top = Math.min(...places.map(p => p.y));
   // From these scales on a place's box touches none.
   const apart = (grid ? [] : places).map(a => Math.max(...places.map(b => (a === b ? 0
     : Math.min(420, 1 / Math.max(Math.abs(a.x - b.x) / 150, Math.abs(a.y - b.y) / 124, 1e-6)))))).sort((a, b) => a - b);
