@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from os import fspath
 from typing import Any
 
@@ -145,35 +145,15 @@ class Inspected(Presented):
 
 @public(InspectOptions)
 def inspect(files: Arguments, options: InspectOptions) -> Inspected:
-    """Show what was understood of a domain and problem."""
-    loaded = files.instance()
-    found = inspection(loaded)
-    if options.states:
-        reachable = count_reachable(loaded.model, loaded.tasks[0].init[None, :])
-        found = replace(found, reachable=reachable)
-    if options.write is not None:
-        texts = domain_text(loaded.domain), problem_text(loaded.problems[0], loaded.domain)
-        write_texts(fspath(options.write), dict(zip(WRITTEN, texts, strict=True)))
-    return found
-
-
-def show_inspect(found: Inspected, options: InspectOptions) -> None:
-    """Print what was understood."""
-    if options.write is not None:
-        note(f"written to {fspath(options.write)}: {', '.join(WRITTEN)}")
-    note_single_robot(found.robots)
-    echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))
-
-
-def inspection(loaded: PlanningInstance) -> Inspected:
-    """Inspect a loaded domain and its first problem.
+    """Show what was understood of a domain and its first problem.
 
     O(pairs of subactions) for the interference count; the work in states is bounded
-    (`planners.search.search_estimate`).
+    (`planners.search.search_estimate`), unless reachable ones are counted.
     """
-    model, domain = loaded.model, loaded.domain
-    found, layers = estimate(model, loaded.tasks[0])
-    start = model.codec.true_facts(loaded.tasks[0].init)
+    loaded = files.instance()
+    model, domain, (task, *_) = loaded.model, loaded.domain, loaded.tasks
+    found, layers = estimate(model, task)
+    start = model.codec.true_facts(task.init)
     idling = idling_schemas(domain)
     acting = {action.schema for action in model.actions}
     asking, formulas = _formulas(model)
@@ -181,7 +161,7 @@ def inspection(loaded: PlanningInstance) -> Inspected:
     statics = _counted(atom.predicate for atom in model.statics)
     idle = "where a joint action says so" if model.is_joint_action else "may idle in every step"
     rows = np.concatenate(layers)[:_LOOK_AT]
-    return Inspected(
+    inspected = Inspected(
         domain=domain.name,
         problem=loaded.problems[0].name,
         style=_style(domain),
@@ -207,7 +187,20 @@ def inspection(loaded: PlanningInstance) -> Inspected:
         facts=len(model.codec.facts),
         goal=formula_text(loaded.problems[0].goal),
         estimate=found,
+        reachable=count_reachable(model, task.init[None, :]) if options.states else None,
     )
+    if options.write is not None:
+        texts = domain_text(domain), problem_text(loaded.problems[0], domain)
+        write_texts(fspath(options.write), dict(zip(WRITTEN, texts, strict=True)))
+    return inspected
+
+
+def show_inspect(found: Inspected, options: InspectOptions) -> None:
+    """Print what was understood."""
+    if options.write is not None:
+        note(f"written to {fspath(options.write)}: {', '.join(WRITTEN)}")
+    note_single_robot(found.robots)
+    echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))
 
 
 def _style(domain: Domain) -> str:

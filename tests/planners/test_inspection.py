@@ -12,7 +12,7 @@ from unittest.mock import DEFAULT, Mock
 
 import pytest
 
-from coordlang.commands.inspect import inspection
+from coordlang.commands.inspect import inspect
 from planners.joint.composition import ComposingStepper
 from planners.loading import PlanningInstance
 from planners.pddl.model_options import ModelOptions
@@ -44,7 +44,7 @@ TASK = """(define (problem p) (:domain pushing) (:objects r1 r2 - robot a b - pl
 
 
 def test_what_was_understood_is_shown() -> None:
-    found = inspection(model_of(PUSHING, TASK))
+    found = inspect(model_of(PUSHING, TASK))
     assert found.impossible == ("carry", "melt")
     assert found.never == ("glows",)
     assert found.objects == {"heavy": 1, "place": 2, "robot": 2}
@@ -57,7 +57,7 @@ def test_what_was_understood_is_shown() -> None:
     # The partner's places in the wrong order: it would have to push the other way from where the
     # anvil is not.
     misread = PUSHING.replace("(push ?o ?x ?from ?to)", "(push ?o ?x ?from ?from)")
-    shown = inspection(model_of(misread, TASK)).formulas
+    shown = inspect(model_of(misread, TASK)).formulas
     assert (
         "(push r1 anvil a b) speaks of (push r2 anvil a a), which no robot can ever do, in the same step"
         in shown
@@ -91,7 +91,7 @@ def test_the_example_can_happen_in_random_models() -> None:
     for seed in range(60):
         text = random_model(seed, ("agent", "plain")[seed % 2])
         loaded = model_of(text.domain, text.problem, ModelOptions(unowned=text.unowned))
-        found = inspection(loaded)
+        found = inspect(loaded)
         if found.example is None:
             hidden += found.interfering > 0
             continue
