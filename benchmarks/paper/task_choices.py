@@ -21,11 +21,12 @@ from planners.search.plans import Plan, Plans, counts
 
 def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[TaskLanguage]:
     """Yield a language in each of its candidate tasks."""
-    partition = language.partition(candidates.model)
+    partition, loaded = language.partition(candidates.model), candidates.loaded
+    declared = loaded.domain, loaded.problems[0]
     for space in candidates.spaces:
         word = partition.word_of(space.rows)[space.state]
         for task in range(len(space.starts)):
-            yield TaskLanguage(language, partition, space, task, word, True)
+            yield TaskLanguage(language, partition, space, task, word, True, declared)
 
 
 @dataclass(frozen=True, slots=True)

@@ -105,20 +105,20 @@ def _to_repair(
     start: LanguageSource, files: PlanningInput, options: BuildOptions
 ) -> tuple[Language, Candidates]:
     """Return the language and the tasks that it is to serve."""
-    language, position = read_language(start)
+    language = read_language(start)
     if not isinstance(language, Language):
         raise UsageError(
-            f"{position} is a lifted language",
+            f"{language.position} is a lifted language",
             remedy="`coordlang ground` makes it an ordinary one, of one problem.",
         )
-    check_domain(language, files.domain, position)
+    check_domain(language, files.domain)
     if files.source.model.slack or (language.tolerance is not None and language.tolerance.slack):
         raise UsageError(
             "--start does not go with --slack: a language for plans within slack is built anew",
             remedy="Leave out --start.",
         )
     candidates = _candidates(files, options, files.options_of(language))
-    return language, with_recorded(language, candidates, position)
+    return language, with_recorded(language, candidates)
 
 
 def _arguments(options: BuildOptions) -> list[str]:

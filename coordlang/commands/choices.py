@@ -126,7 +126,7 @@ def choices(files: Arguments, options: ChoicesOptions) -> RobotsChoices:
     none of, and `OutOfMemory` if the automata do not fit into the memory.
     """
     said = files.needed("SENTENCE")
-    used = files.task().used
+    used = files.task()
     chosen = _numbers(used, options.robot) or tuple(range(len(used.model.robots)))
     return RobotsChoices(used, execution.choices(used, used.words_of(said)), chosen)
 

@@ -205,18 +205,15 @@ def explain(files: Arguments, options: ExplainOptions) -> Explanation:
 
     Raises `NoPlanFits` if no optimal plan has the sentence.
     """
-    task = files.task()
-    used, first = task.used, task.files.problems[0]
+    used = files.task()
     only = None if options.sentence is None else used.words_of(options.sentence)
     if only is not None:
         used.plans_with(only)
     mapped = wording.mapped_states(used.partition, used.model)
     covers = wording.all_covers(mapped)
     descriptions = wording.describe_words(mapped, covers)
-    points = coordinates_of(None, first)
-    lifted = wording.lifted_words(
-        used.language, task.files.domain, first, used.model, points, task.position
-    )
+    points = coordinates_of(None, used.declared[1])
+    lifted = wording.lifted_words(used.language, used.declared, used.model, points)
     words = WordsExplained(used, mapped, covers, descriptions, lifted)
     return Explanation(used, words, only, options.task)
 

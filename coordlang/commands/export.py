@@ -59,7 +59,7 @@ def export(files: Arguments, options: ExportOptions) -> Any:
     the sentence.
     """
     said = files.needed("SENTENCE")
-    used = files.task().used
+    used = files.task()
     words = used.words_of(said)
     if used.model.is_asynchronous and options.to != "bt":
         raise UsageError(

@@ -7,9 +7,9 @@ import functools
 import inspect
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from coordlang.commands import records as given
 from coordlang.commands.records import PlanningOptions, Source, TasksSource
@@ -164,15 +164,13 @@ class Arguments:
         files = self.read()
         return build(files.domain, files.problems, files.source.model)
 
-    def task(self, coordinates: given.CoordinatesSource | None = None) -> ReadTask:
+    def task(self, coordinates: given.CoordinatesSource | None = None) -> TaskLanguage:
         """Read a language and put it into the task of a problem."""
         from coordlang.execution.task_language import language_in_task
 
         language, files = self.needed("LANGUAGE"), self.read()
-        read, position = language_for(language, files, coordinates=coordinates)
-        options = files.options_of(read)
-        used = language_in_task(read, files.domain, files.problems[0], options, position)
-        return ReadTask(files, used, position)
+        read = language_for(language, files, coordinates=coordinates)
+        return language_in_task(read, files.domain, files.problems[0], files.options_of(read))
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,14 +200,6 @@ class PlanningInput:
             return all_pairs(*files, options)
         listed, position = read_tasks(tasks)
         return from_listed(*files, listed, options, position, skip_unsolvable=skip_unsolvable)
-
-
-class ReadTask(NamedTuple):
-    """The files of one problem, a language in its task, and what messages call the language."""
-
-    files: PlanningInput
-    used: TaskLanguage
-    position: Position
 
 
 def wishes_in(prefer: str | Sequence[str]) -> tuple[str, ...]:
@@ -256,23 +246,22 @@ def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
     return tasks_from_data(data, TASKS_GIVEN), TASKS_GIVEN
 
 
-def read_language(language: given.LanguageSource) -> tuple[Language | LiftedLanguage, Position]:
-    """Read a language or a lifted language, with what messages call it."""
+def read_language(language: given.LanguageSource) -> Language | LiftedLanguage:
+    """Read a language or a lifted language."""
     from coordlang.language.file import faults_of_words, language_from_bytes, refuse_first
     from coordlang.language.words import Language
 
     if isinstance(language, Language):
-        position = Position("the language")
-        refuse_first(faults_of_words(language), position)
-        return language, position
+        refuse_first(faults_of_words(language), language.position)
+        return language
     if not isinstance(language, str | PathLike):
-        return language, Position("the lifted language")
+        return language
     data, position = read_bytes(fspath(language)), Position(fspath(language))
     if names_format(data, "coordlang/lifted"):
         from coordlang.lifted.language import lifted_from_bytes
 
-        return lifted_from_bytes(data, position), position
-    return language_from_bytes(data, position), position
+        return lifted_from_bytes(data, position)
+    return replace(language_from_bytes(data, position), position=position)
 
 
 def language_for(
@@ -282,7 +271,7 @@ def language_for(
     *,
     is_verified: bool = True,
     coordinates: given.CoordinatesSource | None = None,
-) -> tuple[Language, Position]:
+) -> Language:
     """Read a language; a lifted one is put into the problems, and verified there for tasks.
 
     Without ``tasks`` for the problems' own ones.  What is verified here keeps the words that no
@@ -290,15 +279,15 @@ def language_for(
     """
     from coordlang.language.words import Language
 
-    read, position = read_language(language)
+    read = read_language(language)
     if isinstance(read, Language):
-        return read, position
+        return read
     from coordlang.commands.lift import ground_in
     from planners.parallel.workers import Workers
 
-    given = files, position, tasks, coordinates, Workers()
+    given = files, tasks, coordinates, Workers()
     found, _ = ground_in(read, *given, is_verified=is_verified, every_word=is_verified)
-    return found, position
+    return replace(found, position=read.position)
 
 
 def coordinates_of(given: given.CoordinatesSource | None, problem: Problem) -> Mapping[str, Point]:

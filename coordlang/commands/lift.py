@@ -184,7 +184,6 @@ def show_lift(found: Lifted, options: LiftOptions) -> int:
 def ground_in(
     lifted: LiftedLanguage,
     files: PlanningInput,
-    position: Position,
     tasks: TasksSource | None,
     coordinates: CoordinatesSource | None,
     workers: Workers,
@@ -199,11 +198,11 @@ def ground_in(
     """
     points = coordinates_of(coordinates, files.problems[0])
     shape = lifted_file.described(lifted)
-    check_domain(shape, files.domain, position)
+    check_domain(shape, files.domain)
     say(f"finding all optimal plans of {files.problems[0].name}")
     candidates = files.candidates(tasks, files.options_of(shape))
     require_solvable(candidates)
-    lifted_file.require_robots(lifted, candidates.model.robots, position)
+    lifted_file.require_robots(lifted, candidates.model.robots)
     states = Instance(candidates, points).states
     known: Known = "unknown"
     if is_verified:
@@ -224,14 +223,13 @@ def ground(arguments: Arguments, options: GroundOptions) -> Language:
     coordination language for these tasks, and `BadInput` if the lifted language belongs to another
     domain or other robots.
     """
-    lifted = arguments.needed("LIFTED")
-    own, position = lifted, Position("the lifted language")
-    if not isinstance(lifted, LiftedLanguage):
-        own, position = lifted_file.read_lifted(fspath(lifted)), Position(fspath(lifted))
+    own = arguments.needed("LIFTED")
+    if not isinstance(own, LiftedLanguage):
+        own = lifted_file.read_lifted(fspath(own))
     files = arguments.read()
     with Jobs(options.jobs).opened() as workers:
         tasks = None if options.tasks == "own" else options.tasks
-        given = files, position, tasks, options.coordinates, workers
+        given = files, tasks, options.coordinates, workers
         language, known = ground_in(own, *given, is_verified=options.verified)
     if known == "refuted":
         learned_from = ", ".join(f"{v.problem} ({_TASKS[v.kind]})" for v in own.verified)

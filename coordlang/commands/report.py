@@ -15,7 +15,7 @@ def report(arguments: Arguments, options: ReportOptions) -> Report:
     """Make the page of a language: its words, and sentences and plans of tasks."""
     files = arguments.read()
     points = coordinates_of(options.coordinates, files.problems[0])
-    read, position = language_for(arguments.needed("LANGUAGE"), files, coordinates=points)
+    read = language_for(arguments.needed("LANGUAGE"), files, coordinates=points)
     return make_report(
         read,
         files.domain,
@@ -23,7 +23,6 @@ def report(arguments: Arguments, options: ReportOptions) -> Report:
         seed=options.seed,
         options=files.options_of(read),
         coordinates=points,
-        position=position,
     )
 
 

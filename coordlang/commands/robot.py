@@ -16,7 +16,7 @@ from select import select  # which takes files, too
 from time import monotonic, time
 from typing import Any, NoReturn
 
-from coordlang.commands.inputs import Arguments, ReadTask, coordinates_of, public, wishes_in
+from coordlang.commands.inputs import Arguments, coordinates_of, public, wishes_in
 from coordlang.commands.records import RobotOptions
 from coordlang.commands.terminal import echo
 from coordlang.execution.best_sentence import Preference, best_sentence, grants, read_preference
@@ -89,8 +89,8 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
     sentence = files.values.get("SENTENCE")
     if sentence is not None and options.prefer:
         raise UsageError("--prefer: the sentence is given", remedy="Leave out one of the two.")
-    read = files.task(options.coordinates)
-    used, robots = read.used, read.used.model.robots
+    used = files.task(options.coordinates)
+    robots = used.model.robots
     number = used.robot_number(options.robot)
     if not used.model.is_asynchronous:
         raise UsageError(
@@ -121,19 +121,19 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
         return own
 
     wanted(wishes)  # what is wrong with them is said now
-    run = _run_of(read, options.run)
+    run = _run_of(used, options.run)
     others = robots[:number] + robots[number + 1 :]
     agreement = Agreement(options.robot, others, sentence, wishes, best, accepts)
     executive = Executive(run, agreement, monitor_of, options.silent_after)
-    points = coordinates_of(options.coordinates, read.files.problems[0])
+    points = coordinates_of(options.coordinates, used.declared[1])
     return RobotInTask(used, executive, run, points)
 
 
-def _run_of(read: ReadTask, name: str | None) -> str:
+def _run_of(used: TaskLanguage, name: str | None) -> str:
     """A name of what all robots must have alike: domain, problem, language, and any given name."""
-    data = {key: value for key, value in to_data(read.used.language).items() if key != "producer"}
-    problem, any_name = read.files.problems[0], [] if name is None else [name]
-    same = [domain_sha256(read.files.domain), problem.source.sha256, data, *any_name]
+    data = {key: value for key, value in to_data(used.language).items() if key != "producer"}
+    (domain, problem), any_name = used.declared, [] if name is None else [name]
+    same = [domain_sha256(domain), problem.source.sha256, data, *any_name]
     return sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()[:16]
 
 

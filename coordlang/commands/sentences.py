@@ -68,7 +68,7 @@ def say(files: Arguments, options: SayOptions) -> Said:
     `NotAPlan` or `NotOptimal` with the first step that breaks: only optimal plans have a sentence.
     """
     plan = files.needed("PLAN")
-    used = files.task().used
+    used = files.task()
     is_file = isinstance(plan, str | PathLike)
     plans = read_plans(fspath(plan), used.model.in_step) if is_file else [tuple(plan)]
     sentences = []
@@ -129,7 +129,7 @@ def understand(files: Arguments, options: UnderstandOptions) -> SentencePlans:
     `BadInput` for a word that the language does not have, or one said twice in a row.
     """
     said = files.needed("SENTENCE")
-    used = files.task().used
+    used = files.task()
     return SentencePlans(used, used.words_of(said))
 
 
@@ -230,7 +230,7 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
             "expected a SENTENCE or --prefer, one of the two",
             remedy="--prefer shortest finds the sentence with the fewest words.",
         )
-    used = files.task().used
+    used = files.task()
     preferences = [read_preference(used, text) for text in wishes_in(options.prefer)]
     best = best_sentence(used, preferences) if preferences else None
     words = best.words if best else used.words_of(sentence or ())

@@ -123,13 +123,13 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     files.needed("LANGUAGE")
     settings, runs = Settings(noise=options.noise), options.runs
     require_simulator()
-    task = files.task(options.coordinates)
+    used = files.task(options.coordinates)
     wished = wishes_in(options.prefer)
     preferred = [text for text in wished if not text.startswith(_VISIT)]
-    prepared = _prepared(task.used, options, preferred)
-    points = coordinates_of(options.coordinates, task.files.problems[0])
+    prepared = _prepared(used, options, preferred)
+    points = coordinates_of(options.coordinates, used.declared[1])
     floor = Floor(prepared.world, points)
-    step, most = _step(task.used, options.step), MOST_RADIUS * floor.shortest
+    step, most = _step(used, options.step), MOST_RADIUS * floor.shortest
     radius = prepared.radius_on(floor, min(settings.radius, most))
     settings = replace(settings, step=step, radius=radius)
     wishes = [_wish(prepared, text) for text in wished if text.startswith(_VISIT)]
@@ -144,7 +144,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     if stopped is not None and not done:
         raise stopped
     record = record_of(prepared, floor, settings, done, wishes)
-    return Simulated(record, task.used.language.tolerance, stopped)
+    return Simulated(record, used.language.tolerance, stopped)
 
 
 def _step(used: TaskLanguage, step: str | None) -> str:

@@ -162,12 +162,12 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
     if isinstance(proof, str | PathLike):
         proof = read_certificate(fspath(proof))
     files = arguments.read()
-    read, position = language_for(arguments.needed("LANGUAGE"), files, tasks, is_verified=False)
-    check_source(read, files.domain, files.problems, position)
+    read = language_for(arguments.needed("LANGUAGE"), files, tasks, is_verified=False)
+    check_source(read, files.domain, files.problems)
     model = files.options_of(read)
     with options.work.opened() as workers:
         if tasks is None:
-            candidates = recorded_candidates(read, files.domain, files.problems, model, position)
+            candidates = recorded_candidates(read, files.domain, files.problems, model)
         else:
             candidates = files.candidates(tasks, model)
         require_solvable(candidates)
@@ -186,7 +186,7 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
                 f"a language of {words} words is verified, and a certificate that "
                 f"{checked.lower_bound} are needed: one of the two is wrong"
             )
-    more = (words, claimed, checked, robots, model, found, read.tolerance, str(position))
+    more = (words, claimed, checked, robots, model, found, read.tolerance, str(read.position))
     return extended(Verification, verdict, *more)
 
 

@@ -144,8 +144,6 @@ def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:
 
 def _is_declared(task_language: TaskLanguage, predicate: str, args: Sequence[str]) -> bool:
     """Whether this is an atom over declared names, be it possible or not."""
-    if task_language.declared is None:
-        return False
     domain, problem = task_language.declared
     return len(args) in domain.predicates.get(predicate, ()) and problem.objects.keys() >= {*args}
 

@@ -22,11 +22,8 @@ from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
 from planners.search.plan_space import PlanSpace
-from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, UsageError, note
+from planners.system.errors import BadInput, OutOfMemory, Refuted, UsageError, note
 from planners.system.messages import Presented, echoed
-
-#: What messages call a language that is of no file.
-LANGUAGE_FILE = Position("the language file")
 
 
 class NoPlanFits(Refuted):
@@ -65,7 +62,7 @@ class TaskLanguage:
     ``covered``: it is one of the language's candidate tasks, and nothing worse happens in it than
     the language says; for any other task nothing is guaranteed.  ``guaranteed``: the plans of each
     sentence mix freely in the task, as ``verdict`` (None: there was none, or it did not fit into
-    the memory) said here. ``declared`` are domain and problem, None where there is only a model.
+    the memory) said here. ``declared`` are domain and problem.
     """
 
     language: Language
@@ -74,7 +71,7 @@ class TaskLanguage:
     task: int
     word: Ints
     covered: bool
-    declared: tuple[Domain, Problem] | None = None
+    declared: tuple[Domain, Problem]
     guaranteed: bool = True
     verdict: Verdict | None = None
 
@@ -182,15 +179,14 @@ def language_in_task(
     domain: Domain,
     problem: Problem,
     options: ModelOptions | None = None,
-    position: Position = LANGUAGE_FILE,
 ) -> TaskLanguage:
     """A language in the task of a PDDL problem.
 
     Raises `BadInput` when domain or problem are not the language's, `ProvedImpossible` for an
     unsolvable task.
     """
-    check_source(language, domain, [problem], position)
-    listed = recorded_list(language)
+    check_source(language, domain, [problem])
+    listed, position = recorded_list(language), language.position
     options = options or options_of(language)
     loaded, recorded = model_of_listed(domain, [problem], listed, options, position)
     atoms = set(" ".join(filter(None, language.states)).replace(") (", ")\0(").split("\0"))

@@ -20,7 +20,7 @@ from coordlang.sites.coordinates import Point
 from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
 from planners.pddl.lifted import Atom, Domain, Problem
-from planners.system.errors import Position, note
+from planners.system.errors import note
 
 #: A conjunction of literals: atom -> its truth value.
 Conjunction = dict[Atom, bool]
@@ -271,26 +271,25 @@ class LiftedWords:
 
 def lifted_words(
     language: Language,
-    domain: Domain,
-    problem: Problem,
+    declared: tuple[Domain, Problem],
     model: JointModel,
     known: Mapping[str, Point],
-    position: Position,
 ) -> LiftedWords | None:
     """The formulas of a language's words over the features that it records.
 
     None where it records none, and, with a note, where the features do not give the states the
-    words that the language gives them.  ``known`` are coordinates of places.
+    words that the language gives them.  ``declared`` are domain and problem, ``known`` coordinates
+    of places.
 
     Raises `BadInput` for features or values that are none.
     """
-    origin = language.provenance.lifted
+    origin, position = language.provenance.lifted, language.position
     if not origin:
         return None
     features = tuple(feature_of(text, position) for text in origin["features"])
     values = read_values(origin["values"], len(features), position)
     table = language.partition(model)
-    states = States(World(domain, problem, model, known), table.rows)
+    states = States(World(*declared, model, known), table.rows)
     lifted = LiftedLanguage(features, language.words, values, model.robots)
     given = [language.words[number] for number in table.word.tolist()]
     if lifted.words_of(states) != given:

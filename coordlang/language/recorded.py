@@ -74,30 +74,28 @@ def _require_same(name: str, given: Any, recorded: Any) -> None:
     raise UsageError(what, remedy=f"Leave out {flag}.")
 
 
-def check_source(
-    language: Language, domain: Domain, problems: list[Problem], position: Position
-) -> None:
+def check_source(language: Language, domain: Domain, problems: list[Problem]) -> None:
     """Raise `BadInput` when domain or problem are not those that the language was built for.
 
     The recorded hash is that of what the domain says; in older files that of its text, or of the
     files of all robots one below the other.
     """
-    check_domain(language, domain, position)
+    check_domain(language, domain)
     for problem in problems:
         if not _is_of_world(language, domain, problem):
-            raise position.fail(
+            raise language.position.fail(
                 f"{problem.source.name} has other objects or static facts than the language's "
                 "problem",
                 "A language serves the problems of one world: same objects, same static facts.",
             )
 
 
-def check_domain(language: Language, domain: Domain, position: Position) -> None:
+def check_domain(language: Language, domain: Domain) -> None:
     """Raise `BadInput` when a domain is not that of the language; see `check_source`."""
     wanted = language.provenance.domain.get("sha256")
     known = domain_sha256(domain), domain.source.sha256, domain.source.text_sha256
     if wanted not in (None, *known):
-        raise position.fail(
+        raise language.position.fail(
             "this language belongs to another domain "
             f"({echoed(language.provenance.domain.get('name'))}): what "
             f"{domain.source.name} says has another hash",
@@ -117,11 +115,7 @@ def recorded_list(language: Language) -> list[ListedTask]:
 
 
 def recorded_candidates(
-    language: Language,
-    domain: Domain,
-    problems: list[Problem],
-    options: ModelOptions,
-    position: Position,
+    language: Language, domain: Domain, problems: list[Problem], options: ModelOptions
 ) -> Candidates:
     """The candidate tasks that a language file records, else the problems' own ones."""
     kind, count = language.provenance.tasks["kind"], language.provenance.tasks["count"]
@@ -139,9 +133,9 @@ def recorded_candidates(
                 remedy="Say --tasks all or --tasks FILE.",
             )
         make = from_listed if kind == "file" else from_recorded
-        return make(domain, problems, listed, options, position)
+        return make(domain, problems, listed, options, language.position)
     except BadInput as error:
-        error.position = error.position or position
+        error.position = error.position or language.position
         raise
 
 
@@ -169,7 +163,7 @@ def _require_same_pairs(language: Language, candidates: Candidates) -> None:
         )
 
 
-def with_recorded(language: Language, candidates: Candidates, position: Position) -> Candidates:
+def with_recorded(language: Language, candidates: Candidates) -> Candidates:
     """Candidate tasks together with those that a language records.
 
     On another map, where problems have other objects or static facts, the recorded tasks do not
@@ -182,11 +176,11 @@ def with_recorded(language: Language, candidates: Candidates, position: Position
     if not all(_is_of_world(language, domain, problem) for problem in problems):
         return candidates
     if language.provenance.tasks["kind"] == "all":
-        _require_all_pairs(language, candidates, position)
+        _require_all_pairs(language, candidates)
         return candidates
     recorded = recorded_list(language)
     if candidates.kind == "all":
-        _require_pairs(recorded, candidates, position)
+        _require_pairs(recorded, candidates, language.position)
         return candidates
     both = [*recorded, *candidates.listed]
     listed = [both[number] for number in first_of_equal(both)]
@@ -194,7 +188,7 @@ def with_recorded(language: Language, candidates: Candidates, position: Position
         return candidates
     kinds = {candidates.kind, language.provenance.tasks["kind"]}
     make = from_recorded if kinds == {"problems"} else from_listed
-    together = make(domain, problems, listed, candidates.loaded.options, position)
+    together = make(domain, problems, listed, candidates.loaded.options, language.position)
     return replace(together, skipped=candidates.skipped)
 
 
@@ -228,10 +222,10 @@ def _require_pairs(recorded: list[ListedTask], candidates: Candidates, position:
             )
 
 
-def _require_all_pairs(language: Language, candidates: Candidates, position: Position) -> None:
+def _require_all_pairs(language: Language, candidates: Candidates) -> None:
     """Raise `BadInput` unless the candidate tasks are all pairs, with all that are recorded."""
     if candidates.kind != "all":
-        raise position.fail(
+        raise language.position.fail(
             "this language serves all pairs of states, and others cannot be added to them",
             "Say --tasks all, with the problems whose states count.",
         )
@@ -240,6 +234,6 @@ def _require_all_pairs(language: Language, candidates: Candidates, position: Pos
         if language.states.keys() <= set(map(candidates.model.codec.key, candidates.rows)):
             return
         have = "do not reach all their states"
-    raise position.fail(
+    raise language.position.fail(
         f"this language serves {recorded:,} pairs of states, but these problems {have}", _ALSO
     )

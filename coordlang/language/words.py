@@ -15,7 +15,7 @@ from coordlang.language.provenance import Guarantee, Provenance, Tolerance, Unkn
 from planners.joint.model import JointModel
 from planners.joint.states import StateCodec
 from planners.joint.tables import Ints, Rows, find_rows, unique_rows
-from planners.system.errors import BadInput
+from planners.system.errors import BadInput, Position
 from planners.system.messages import Presented, echoed
 
 
@@ -85,13 +85,15 @@ class Language(Presented):
     """A partition of states as text, and where it comes from.
 
     ``states``: state key (`planners.joint.states.StateCodec.key`) -> word; ``default`` is the word
-    of every other state; ``provenance`` the model, tasks and method that it was made with.
+    of every other state; ``provenance`` the model, tasks and method that it was made with;
+    ``position`` is what messages call the language.
     """
 
     words: tuple[str, ...]
     states: Mapping[str, str]
     default: str
     provenance: Provenance = field(default_factory=Provenance)
+    position: Position = field(default=Position("the language"), compare=False)
 
     @classmethod
     def of(

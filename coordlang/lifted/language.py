@@ -75,7 +75,7 @@ class LiftedLanguage:
     language files (`coordlang.language.provenance`).  ``names_robots``: the robots were named when
     it was learned, as in ``--robots``; if not, the robots of another problem are found as always,
     and have to be the same.  It was ``verified`` on these problems; nothing is claimed of others.
-    ``producer`` says who made it, and how.
+    ``producer`` says who made it, and how; ``position`` is what messages call it.
     """
 
     features: tuple[Feature, ...]
@@ -87,6 +87,7 @@ class LiftedLanguage:
     names_robots: bool = False
     verified: tuple[Verified, ...] = ()
     producer: Mapping[str, Any] = field(default_factory=dict)
+    position: Position = field(default=Position("the lifted language"), compare=False)
 
     def words_of(self, states: States) -> list[str]:
         """The word of each state of any problem of the domain."""
@@ -142,13 +143,13 @@ def described(lifted: LiftedLanguage) -> Language:
     """What a lifted language records of domain and model, as a language without states."""
     robots = lifted.robots if lifted.names_robots else ()
     provenance = Provenance(robots, None, lifted.domain, lifted.model)
-    return Language(lifted.words, {}, lifted.words[0], provenance=provenance)
+    return Language(lifted.words, {}, lifted.words[0], provenance, lifted.position)
 
 
-def require_robots(lifted: LiftedLanguage, robots: Sequence[str], position: Position) -> None:
+def require_robots(lifted: LiftedLanguage, robots: Sequence[str]) -> None:
     """Raise `BadInput` for other robots than those that the words are about."""
     if tuple(robots) != lifted.robots:
-        raise position.fail(
+        raise lifted.position.fail(
             f"the words are about {', '.join(lifted.robots)}, and the robots here are "
             f"{', '.join(robots)}",
             "Use a problem with these robots, or name them with --robots.",
@@ -271,6 +272,7 @@ def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
         record.names_robots,
         tuple(record.verified),
         record.producer,
+        position,
     )
 
 

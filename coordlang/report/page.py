@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from coordlang.execution.task_language import LANGUAGE_FILE, TaskLanguage
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import (
     LiftedWords,
@@ -36,7 +36,7 @@ from planners.joint.states import split_atoms
 from planners.joint.tables import find_rows
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
-from planners.system.errors import OutOfMemory, Position
+from planners.system.errors import OutOfMemory
 from planners.system.messages import counted, named
 
 #: States of the language beyond which their graph is not drawn, they are not listed, formulas are
@@ -262,20 +262,19 @@ def make_report(
     seed: int = 0,
     options: ModelOptions | None = None,
     coordinates: Mapping[str, Point] | None = None,
-    position: Position = LANGUAGE_FILE,
 ) -> Report:
     """Render the report of a language; the same arguments give the same bytes.
 
     It shows the problems' tasks and candidate tasks drawn with ``seed``, at most ``tasks_shown``,
     fewer if the page would have more than `LARGEST` bytes.  ``options`` say how the model is built
-    (default: as the language file says), ``coordinates`` where places are.  ``position`` is what
-    messages name as the place of the language.  Raises `OutOfMemory` if the page of a single task
-    would be too large, and what `coordlang.report.task.select_tasks` raises.
+    (default: as the language file says), ``coordinates`` where places are.  Raises `OutOfMemory` if
+    the page of a single task would be too large, and what `coordlang.report.task.select_tasks`
+    raises.
     """
     points, options = coordinates or {}, options or options_of(language)
-    selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
+    selection = select_tasks(language, domain, problems, tasks_shown, seed, options)
     first = selection.tasks[0].language
-    lifted = lifted_words(language, domain, problems[0], first.model, points, position)
+    lifted = lifted_words(language, first.declared, first.model, points)
     rows, in_order = word_rows(first, lifted)
     shown: dict[str, Any] = {
         "language": language,

@@ -26,7 +26,7 @@ from planners.joint.tables import Ints, Rows
 from planners.parallel.workers import Workers
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
-from planners.system.errors import BadInput, Position, ProvedImpossible
+from planners.system.errors import BadInput, ProvedImpossible
 from planners.system.messages import counted, named
 
 #: Pairs of states, times robots, up to which all pairs are looked at: some seconds of work.
@@ -71,14 +71,14 @@ def heat_of(
     Tasks whose divergences are not defined (no language serves them) or not found count as not
     there; None if there are no others.
     """
-    first, nowhere = selection.tasks[0].language, Position("")
+    first = selection.tasks[0].language
     language = first.language
     if first.model.hides_slack or language.may_fail:
         return None
     is_all = language.provenance.tasks.get("kind") == "all" and not first.model.is_asynchronous
     if is_all and len(language.states) ** 2 * len(first.model.robots) <= _MOST_PAIRS:
         with suppress(BadInput, ProvedImpossible):  # a language may be used on another map
-            candidates = recorded_candidates(language, domain, [*problems], options, nowhere)
+            candidates = recorded_candidates(language, domain, [*problems], options)
             found = differences(candidates, Workers(), most=_MIXTURES).divergences
             if found is not None:
                 known = _located(first.model, [(candidates.rows, found)])

@@ -19,7 +19,7 @@ import numpy as np
 from coordlang.execution.automaton import determinise
 from coordlang.execution.best_sentence import leading_sentences
 from coordlang.execution.plan_sentence import carried_out
-from coordlang.execution.task_language import LANGUAGE_FILE, TaskLanguage, language_in_task
+from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.language.candidates import describe, explored_if_small
 from coordlang.language.listed import goal_text, ground_tasks
 from coordlang.language.recorded import recorded_list
@@ -40,7 +40,7 @@ from planners.search.kept_plans import search
 from planners.search.optimal_plans import plan_space
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
-from planners.system.errors import OutOfMemory, Position, ProvedImpossible, UsageError
+from planners.system.errors import OutOfMemory, ProvedImpossible, UsageError
 
 #: Tasks looked at for each one shown, so that enough of them require coordination.
 _TRIES = 12
@@ -101,7 +101,6 @@ def select_tasks(
     number: int,
     seed: int,
     options: ModelOptions | None = None,
-    position: Position = LANGUAGE_FILE,
 ) -> Selection:
     """Select at most ``number`` tasks: those of the problems, then different candidate tasks.
 
@@ -112,11 +111,8 @@ def select_tasks(
     if len(problems) > number:
         what = f"{len(problems)} problems are given and {number} tasks are to be shown"
         raise UsageError(what, remedy="Give fewer problems.")
-    given = [
-        _examined(p.name, language_in_task(language, domain, p, options, position))
-        for p in problems
-    ]
-    candidates = _candidates(given[0].language, domain, problems[0], Random(seed), position)
+    given = [_examined(p.name, language_in_task(language, domain, p, options)) for p in problems]
+    candidates = _candidates(given[0].language, Random(seed))
     known = {describe(task.language.space, task.language.task) for task in given}
     room = number - len(given)
     wanted = round(room * _REQUIRING)
@@ -155,9 +151,7 @@ def _examined(name: str | None, language: TaskLanguage) -> ShownTask:
         return ShownTask(name, language, None, False)
 
 
-def _candidates(
-    first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position
-) -> Iterator[TaskLanguage]:
+def _candidates(first: TaskLanguage, random: Random) -> Iterator[TaskLanguage]:
     """Yield the language's candidate tasks in random order, some of them more than once."""
     kind, explored, model = first.language.provenance.tasks.get("kind"), None, first.model.in_step
     if kind != "problems":  # many tasks: where states are few they are searched once for all
@@ -167,7 +161,7 @@ def _candidates(
     else:
         listed = recorded_list(first.language)
         random.shuffle(listed)
-        ground = ground_tasks(domain, problem, listed, position)
+        ground = ground_tasks(*first.declared, listed, first.language.position)
         tasks = (PlanningTask("listed", first.model.state(init), goal) for init, goal in ground)
     for task in tasks:
         init = task.init[None, :]

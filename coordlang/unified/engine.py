@@ -55,6 +55,7 @@ from planners.system.errors import (
     Note,
     OutOfMemory,
     OutOfTime,
+    Position,
     ProvedImpossible,
     Unsupported,
     UsageError,
@@ -182,7 +183,8 @@ def _read(given: Language | str | None) -> Language | None:
         )
     recorded = language.provenance
     domain, model = {**recorded.domain, "sha256": None}, {**recorded.model, "world_sha256": None}
-    return replace(language, provenance=replace(recorded, domain=domain, model=model))
+    provenance = replace(recorded, domain=domain, model=model)
+    return replace(language, provenance=provenance, position=Position("the language file"))
 
 
 #: What is said of a plan that is valid step by step, and orders its actions less than that.

@@ -62,7 +62,8 @@ def in_words(
     language: Language | None, table: Partition, space: PlanSpace, task: int
 ) -> TaskLanguage:
     word = table.word_of(space.rows)[space.state]
-    return TaskLanguage(language or language_of({}, table.words), table, space, task, word, True)
+    known = language or language_of({}, table.words)
+    return TaskLanguage(known, table, space, task, word, True, None)  # type: ignore[arg-type]
 
 
 def language_of(words: dict[str, str], names: tuple[str, ...]) -> Language:

@@ -126,7 +126,7 @@ def random_graph(random: Random) -> TaskLanguage:
         ]
     space = layered_space(sizes, edges)
     word = np.array([random.randrange(random.choice([2, 3])) for _ in edges])
-    return TaskLanguage(None, None, space, 0, word, True)  # type: ignore[arg-type]
+    return TaskLanguage(None, None, space, 0, word, True, None)  # type: ignore[arg-type]
 
 
 def worst_state(grade_of: list[int]) -> PlanPreference:

@@ -109,9 +109,8 @@ def test_failures_of_one_sentence_make_up_those_of_all() -> None:
     said = sentence_counts(space, word)[int(space.starts[0])]
     failures = []
     for words, plans in sorted(said.items()):
-        used = TaskLanguage(None, None, space, 0, word, True)  # type: ignore[arg-type]
-        fits = used.plans_with(words)
-        failure = failure_of_sentence(space, int(space.starts[0]), fits)
+        used = TaskLanguage(None, None, space, 0, word, True, None)  # type: ignore[arg-type]
+        failure = failure_of_sentence(space, used.start, used.plans_with(words))
         failures.append(Fraction(plans, said.total()) * failure)
     assert len(failures) > 1
     assert sum(failures) == failure_probability([space], [word])[0] > 0
