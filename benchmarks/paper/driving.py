@@ -9,7 +9,7 @@ from typing import Any
 from benchmarks.paper.task_choices import sentence_of
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.simulation.record import RunRecord, WishRecord
-from coordlang.simulation.run import runs_of
+from coordlang.simulation.run import Simulation
 from coordlang.simulation.simulator import Floor, Settings
 from coordlang.simulation.team import Agreement, Mission
 from coordlang.sites.coordinates import Point
@@ -30,8 +30,7 @@ def drive(
 ) -> RunRecord:
     """Let robots do a mission once; ``known`` are coordinates that names do not say."""
     floor = Floor(prepared.world, known or {})
-    [found] = runs_of(prepared, floor, how, 1, seed, wishes)
-    return found
+    return next(Simulation(prepared, floor, how, wishes).runs(1, seed))
 
 
 def is_well(found: RunRecord) -> bool:

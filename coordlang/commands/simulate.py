@@ -25,7 +25,7 @@ from coordlang.simulation.record import (
     to_bytes,
 )
 from coordlang.simulation.recording import RECORDINGS
-from coordlang.simulation.run import record_of, runs_of
+from coordlang.simulation.run import Simulation
 from coordlang.simulation.simulator import MOST_RADIUS, Floor, Settings, require_simulator
 from coordlang.simulation.team import Agreement, Mission
 from planners.system.errors import UsageError, note
@@ -133,18 +133,17 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     radius = prepared.radius_on(floor, min(settings.radius, most))
     settings = replace(settings, step=step, radius=radius)
     wishes = [_wish(prepared, text) for text in wished if text.startswith(_VISIT)]
-    done: list[RunRecord] = []
+    simulation, done = Simulation(prepared, floor, settings, wishes), list[RunRecord]()
 
     def work() -> None:
         with reaching(lambda: f"{len(done)} of {counted(runs, 'run')}", "fewer runs"):
-            for finished in runs_of(prepared, floor, settings, runs, options.seed or 0, wishes):
-                done.append(finished)  # noqa: PERF402 - one after the other: it may be stopped
+            for finished in simulation.runs(runs, options.seed or 0):
+                done.append(finished)  # one after the other: it may be stopped
 
     stopped = run_until_stopped(work)
     if stopped is not None and not done:
         raise stopped
-    record = record_of(prepared, floor, settings, done, wishes)
-    return Simulated(record, used.language.tolerance, stopped)
+    return Simulated(simulation.record(done), used.language.tolerance, stopped)
 
 
 def _step(used: TaskLanguage, step: str | None) -> str:

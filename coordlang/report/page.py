@@ -129,30 +129,22 @@ def word_rows(used: TaskLanguage, lifted: LiftedWords | None) -> tuple[list[dict
         told = describe_words(mapped, all_covers(mapped))
         in_order, rest = told.in_order, {word for word, cover in told.rules if cover is None}
         terms = {word: [*map(term_text, own.terms if own else ())] for word, own in told.rules}
-    sizes = language.sizes()
-    rows = [_word_row(language, sizes, word, own, word in rest) for word, own in terms.items()]
+    sizes, rows = language.sizes(), []
+    for word, own in terms.items():
+        states = (key for key, said in language.states.items() if said == word)
+        row = {
+            "name": word,
+            "number": language.words.index(word),
+            "size": sizes[word],
+            "share": round(100 * sizes[word] / max([1, *sizes.values()]), 1),
+            "default": word == language.default,
+            "rest": word in rest,
+            "terms": None if own is None else list(own[:_TERMS]),
+            "more_terms": max(0, len(own or ()) - _TERMS),
+            "examples": [*islice(states, _EXAMPLES)] if own is None else [],
+        }
+        rows.append(row)
     return rows, in_order
-
-
-def _word_row(
-    language: Language,
-    sizes: Mapping[str, int],
-    word: str,
-    terms: Sequence[str] | None,
-    is_rest: bool,
-) -> dict[str, Any]:
-    states = (key for key, own in language.states.items() if own == word)
-    return {
-        "name": word,
-        "number": language.words.index(word),
-        "size": sizes[word],
-        "share": round(100 * sizes[word] / max([1, *sizes.values()]), 1),
-        "default": word == language.default,
-        "rest": is_rest,
-        "terms": None if terms is None else list(terms[:_TERMS]),
-        "more_terms": max(0, len(terms or ()) - _TERMS),
-        "examples": [*islice(states, _EXAMPLES)] if terms is None else [],
-    }
 
 
 def _map(world: World, known: Mapping[str, Point]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, astuple
+from dataclasses import asdict, astuple, dataclass
 from functools import partial
 from itertools import combinations
 from random import Random
@@ -31,72 +31,60 @@ _PATIENCE = 4
 _INTERVAL = 2
 
 
-def runs_of(
-    mission: Mission,
-    floor: Floor,
-    settings: Settings,
-    number: int,
-    seed: int = 0,
-    wishes: Sequence[WishRecord] = (),
-) -> Iterator[RunRecord]:
-    """Run a mission so many times, with the seeds ``seed``, ``seed + 1``, ..
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """A mission, a floor with the places of its world, and what robots come to want on the way."""
 
-    ``floor`` has the places of the mission's world; ``wishes`` are what robots come to want on the
-    way.  The same seed gives the same run; O(robots * ticks).  Raises `UsageError` if ir-sim is not
-    installed, or the robots are too large for the floor.
-    """
-    floor.require_room(settings.radius)
-    for further in range(number):
-        going = _Going(mission, floor, settings, seed + further, wishes)
-        while not going.has_ended:
-            going.tick()
-        yield going.record()
+    mission: Mission
+    floor: Floor
+    settings: Settings
+    wishes: Sequence[WishRecord] = ()
 
+    def runs(self, number: int, seed: int = 0) -> Iterator[RunRecord]:
+        """Run the mission so many times, with the seeds ``seed``, ``seed + 1``, ..
 
-def record_of(
-    mission: Mission,
-    floor: Floor,
-    settings: Settings,
-    runs: Sequence[RunRecord],
-    wishes: Sequence[WishRecord] = (),
-) -> SimulationRecord:
-    """Put runs together with what they were made with."""
-    used = mission.task_language
-    return SimulationRecord(
-        format=FORMAT,
-        version=VERSION,
-        domain=dict(used.language.provenance.domain),
-        task=describe(used.space, used.task),
-        robots=list(mission.robots),
-        agreement=mission.agreement,
-        sentence=used.text(mission.sentence) if mission.agreement == "sentence" else None,
-        covered=used.covered,
-        makespan=mission.steps,
-        period=period(floor.longest),
-        interval=_INTERVAL * TICK,
-        cell=1.0,
-        **asdict(settings),
-        wishes=list(wishes),
-        places={name: (round(x, 6), round(y, 6)) for name, (x, y) in sorted(floor.points.items())},
-        walls=list(floor.walls),
-        goals=dict(mission.goals),
-        runs=list(runs),
-    )
+        The same seed gives the same run; O(robots * ticks).  Raises `UsageError` if ir-sim is not
+        installed, or the robots are too large for the floor.
+        """
+        self.floor.require_room(self.settings.radius)
+        for further in range(number):
+            going = _Going(self, seed + further)
+            while not going.has_ended:
+                going.tick()
+            yield going.record()
+
+    def record(self, runs: Sequence[RunRecord]) -> SimulationRecord:
+        """Put runs together with what they were made with."""
+        mission, used, points = self.mission, self.mission.task_language, self.floor.points
+        return SimulationRecord(
+            format=FORMAT,
+            version=VERSION,
+            domain=dict(used.language.provenance.domain),
+            task=describe(used.space, used.task),
+            robots=list(mission.robots),
+            agreement=mission.agreement,
+            sentence=used.text(mission.sentence) if mission.agreement == "sentence" else None,
+            covered=used.covered,
+            makespan=mission.steps,
+            period=period(self.floor.longest),
+            interval=_INTERVAL * TICK,
+            cell=1.0,
+            **asdict(self.settings),
+            wishes=list(self.wishes),
+            places={name: (round(x, 6), round(y, 6)) for name, (x, y) in sorted(points.items())},
+            walls=list(self.floor.walls),
+            goals=dict(mission.goals),
+            runs=list(runs),
+        )
 
 
 class _Going:
-    def __init__(
-        self,
-        mission: Mission,
-        floor: Floor,
-        settings: Settings,
-        seed: int,
-        wishes: Sequence[WishRecord],
-    ) -> None:
+    def __init__(self, simulation: Simulation, seed: int) -> None:
+        mission, floor, settings = simulation.mission, simulation.floor, simulation.settings
         self.mission, self.settings, self.seed = mission, settings, seed
         self.period = period(floor.longest)
         wished: dict[str, dict[int, list[str]]] = {name: {} for name in mission.robots}
-        for wish in wishes:
+        for wish in simulation.wishes:
             wished[wish.robot].setdefault(wish.step, []).append(wish.visit)
         self.robots = {
             name: Robot(

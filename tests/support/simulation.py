@@ -9,7 +9,7 @@ from coordlang.commands.building import build_language
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.simulation.record import RunRecord, WishRecord
-from coordlang.simulation.run import runs_of
+from coordlang.simulation.run import Simulation
 from coordlang.simulation.simulator import Floor, Settings
 from coordlang.simulation.team import Agreement, Mission
 from planners.pddl.model_options import ModelOptions
@@ -49,4 +49,4 @@ def runs(
 ) -> list[RunRecord]:
     """Runs in a shipped problem's own task, of seeds one after the other."""
     of = mission_of(folder, agreement=agreement)
-    return list(runs_of(of, floor_for(of), settings, number, wishes=wishes))
+    return list(Simulation(of, floor_for(of), settings, wishes).runs(number))

@@ -36,7 +36,7 @@ from coordlang.simulation.record import (
     to_bytes,
 )
 from coordlang.simulation.recording import RECORDINGS, ROBOTS, Scene, frames, new_figure
-from coordlang.simulation.run import record_of, runs_of
+from coordlang.simulation.run import Simulation
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Mission
 from planners.pddl import parse_problem
@@ -58,7 +58,7 @@ def nearest(found: RunRecord) -> float:
 
 def keeps_its_promises(of: Mission, settings: Settings, number: int) -> list[RunRecord]:
     """Nobody collides, waits in vain or comes late."""
-    runs = list(runs_of(of, floor_for(of), settings, number))
+    runs = list(Simulation(of, floor_for(of), settings).runs(number))
     for found in runs:
         assert (found.collisions, found.deadlock, found.late) == (0, False, 0)
         assert found.arrived
@@ -100,7 +100,7 @@ def test_four_robots_of_the_greatest_radius_rotate(step: str) -> None:
 
 def test_robots_drive_off_together_however_far_each_has_to_turn() -> None:
     settings = Settings(noise=0.0)
-    for found in runs_of(ring(), floor_for(ring()), settings, 3):
+    for found in Simulation(ring(), floor_for(ring()), settings).runs(3):
         turns = {round(abs(poses[0][2] - poses[-1][2]), 1) for poses in found.poses.values()}
         assert len(turns) > 1
         left = {
@@ -181,7 +181,7 @@ def test_within_a_word_robots_get_out_of_step() -> None:
     """Why a barrier for each word is not enough: the same choices, done in step, are a plan."""
     mission = mission_of("t-map", method="minimal")
     assert len(mission.sentence) == 1, "there is no barrier at all"
-    found = list(runs_of(mission, floor_for(mission), Settings(step="word"), 6))
+    found = list(Simulation(mission, floor_for(mission), Settings(step="word")).runs(6))
     idle = [s for run_ in found for s in run_.steps if s.subaction is None and s.end is not None]
     assert min(step.end - step.begin for step in idle if step.end is not None) > 1, "a whole step"
     broken = [run_ for run_ in found if not run_.arrived]
@@ -216,9 +216,9 @@ def test_robots_without_a_common_step_wait_for_passings_alone(problem: str, numb
 
 def test_without_an_agreement_they_contradict_each_other_or_wait_for_ever() -> None:
     mission = mission_of("t-map", agreement="nothing", method="best", asynchronous=True)
-    found = list(runs_of(mission, floor_for(mission), Settings(step="passings"), 8))
+    found = list(Simulation(mission, floor_for(mission), Settings(step="passings")).runs(8))
     mission = ring(2, words=1, asynchronous=True)  # some wait for partners that chose otherwise
-    found += runs_of(mission, floor_for(mission), Settings(step="passings"), 1, 5)
+    found += Simulation(mission, floor_for(mission), Settings(step="passings")).runs(1, 5)
     assert {run_.mixes for run_ in found} == {True, False}
     assert all(run_.arrived for run_ in found if run_.mixes)
     assert any(run_.deadlock for run_ in found)
@@ -252,9 +252,9 @@ def test_under_a_whole_plan_a_detour_can_be_had_only_if_it_is_on_it() -> None:
 
 @cache
 def record() -> SimulationRecord:
-    mission, settings = mission_of("t-map", agreement="nothing"), Settings()
-    floor = floor_for(mission)
-    return record_of(mission, floor, settings, list(runs_of(mission, floor, settings, 1, 1)))
+    mission = mission_of("t-map", agreement="nothing")
+    simulation = Simulation(mission, floor_for(mission), Settings())
+    return simulation.record([*simulation.runs(1, 1)])
 
 
 def pixels(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], colour: str) -> int:
