@@ -175,10 +175,7 @@ class TaskLanguage:
 
 
 def language_in_task(
-    language: Language,
-    domain: Domain,
-    problem: Problem,
-    options: ModelOptions | None = None,
+    language: Language, domain: Domain, problem: Problem, options: ModelOptions | None = None
 ) -> TaskLanguage:
     """A language in the task of a PDDL problem.
 

@@ -14,9 +14,6 @@ from coordlang.simulation.simulator import Wall
 from planners.system.errors import Position
 from planners.system.files import FileFormat, doc, read_bytes
 
-FORMAT = "coordlang/simulation"
-VERSION = 1
-
 #: Places, walls and poses lie within so many metres, and nothing is larger.
 _LARGEST = 1e6
 
@@ -167,7 +164,7 @@ class SimulationRecord(msgspec.Struct, frozen=True):
     runs: Annotated[list[RunRecord], doc("The runs.")]
 
 
-SIMULATION = FileFormat("simulation", "record of runs", SimulationRecord, FORMAT, VERSION)
+SIMULATION = FileFormat("simulation", "record of runs", SimulationRecord, "coordlang/simulation")
 
 
 def to_bytes(record: SimulationRecord) -> bytes:

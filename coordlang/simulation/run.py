@@ -13,8 +13,7 @@ from typing import Any
 
 from coordlang.language.candidates import describe
 from coordlang.simulation.record import (
-    FORMAT,
-    VERSION,
+    SIMULATION,
     EventRecord,
     RunRecord,
     SimulationRecord,
@@ -57,8 +56,8 @@ class Simulation:
         """Put runs together with what they were made with."""
         mission, used, points = self.mission, self.mission.task_language, self.floor.points
         return SimulationRecord(
-            format=FORMAT,
-            version=VERSION,
+            format=str(SIMULATION.format),
+            version=SIMULATION.version,
             domain=dict(used.language.provenance.domain),
             task=describe(used.space, used.task),
             robots=list(mission.robots),
