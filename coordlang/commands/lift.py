@@ -21,12 +21,12 @@ from coordlang.commands.records import (
 from coordlang.commands.terminal import UNPROVED, echo, ended_early, say, write
 from coordlang.language import file as language_file
 from coordlang.language.candidates import require_solvable
-from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
+from coordlang.language.provenance import Guarantee, Provenance, provenance_of, world_sha256
 from coordlang.language.recorded import check_domain
 from coordlang.language.words import Language
 from coordlang.lifted import language as lifted_file
 from coordlang.lifted.features import english, formula
-from coordlang.lifted.language import Known, LiftedLanguage, Verified, grounded
+from coordlang.lifted.language import LiftedLanguage, Verified, written_values
 from coordlang.lifted.learning import Instance, Learned, learn
 from coordlang.verification.by_definition import verify_candidates
 from planners.parallel.workers import Workers
@@ -190,28 +190,45 @@ def ground_in(
     *,
     is_verified: bool,
     every_word: bool = False,
-) -> tuple[Language, Known]:
-    """The words of a problem's states, verified there unless that is not wanted or does not fit.
+) -> tuple[Language, str]:
+    """The words of the states on a problem's plans, and whether they were verified there.
 
-    With ``every_word`` the language has the words that no state here has, too.  Raises `BadInput`
-    if the lifted language belongs to another domain or other robots.
+    Unless that is not wanted or does not fit; or they were refuted.  Then the language covers no
+    task: it guarantees nothing.  With ``every_word`` it has the words that no state here has, too.
+    Raises `BadInput` if the lifted language belongs to another domain or other robots.
     """
     points = coordinates_of(coordinates, files.problems[0])
-    shape = lifted_file.described(lifted)
+    named = lifted.robots if lifted.names_robots else ()
+    recorded = Provenance(named, None, lifted.domain, lifted.model)
+    shape = Language(lifted.words, {}, lifted.words[0], recorded, lifted.position)
     check_domain(shape, files.domain)
     say(f"finding all optimal plans of {files.problems[0].name}")
     candidates = files.candidates(tasks, files.options_of(shape))
     require_solvable(candidates)
-    lifted_file.require_robots(lifted, candidates.model.robots)
-    states = Instance(candidates, points).states
-    known: Known = "unknown"
+    if (robots := candidates.model.robots) != lifted.robots:
+        raise lifted.position.fail(
+            f"the words are about {', '.join(lifted.robots)}, and the robots here are "
+            f"{', '.join(robots)}",
+            "Use a problem with these robots, or name them with --robots.",
+        )
+    states, known = Instance(candidates, points).states, "not verified"
     if is_verified:
         try:
             verdict = verify_candidates(lifted.partition(states), candidates, workers, say)
             known = "verified" if verdict.holds else "refuted"
         except OutOfMemory as error:
             note(f"the words are not verified here: {error.what}")
-    return grounded(lifted, candidates, states, known, _PRODUCER, every_word=every_word), known
+    partition = lifted.partition(states, every_word=every_word)
+    guarantee = Guarantee.of(f"lifted; {known} here", len(partition.words), 1)
+    origin = {
+        "features": [*map(str, lifted.features)],
+        "values": written_values(lifted.values),
+        "verified": [one.problem for one in lifted.verified],
+    }
+    provenance = replace(provenance_of(candidates, guarantee, _PRODUCER), lifted=origin)
+    if known != "verified":
+        provenance = replace(provenance, tasks={"kind": "problems", "count": 0})
+    return Language.of(partition, candidates.model, provenance), known
 
 
 @public(GroundOptions)

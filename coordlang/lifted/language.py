@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 
-from coordlang.language.candidates import Candidates, Kind
+from coordlang.language.candidates import Kind
 from coordlang.language.file import (
     DomainRecord,
     Fault,
@@ -23,8 +23,7 @@ from coordlang.language.file import (
     refuse_duplicates,
     refuse_first,
 )
-from coordlang.language.provenance import Guarantee, Provenance, provenance_of
-from coordlang.language.words import Language, Partition
+from coordlang.language.words import Partition
 from coordlang.lifted.features import LARGEST, Feature, feature_of
 from coordlang.lifted.world import States
 from planners.joint.tables import Ints
@@ -131,58 +130,6 @@ def read_values(entries: Mapping[str, str], size: int, position: Position) -> di
             raise position.fail(f"{echoed(key)} are no values of {size} features", LIFT_AGAIN)
         found[vector] = word
     return found
-
-
-# ---- in one problem: an ordinary language, which says what is known of it there
-
-#: Whether the words were verified in the problem, refuted there, or neither.
-Known = Literal["verified", "refuted", "unknown"]
-
-
-def described(lifted: LiftedLanguage) -> Language:
-    """What a lifted language records of domain and model, as a language without states."""
-    robots = lifted.robots if lifted.names_robots else ()
-    provenance = Provenance(robots, None, lifted.domain, lifted.model)
-    return Language(lifted.words, {}, lifted.words[0], provenance, lifted.position)
-
-
-def require_robots(lifted: LiftedLanguage, robots: Sequence[str]) -> None:
-    """Raise `BadInput` for other robots than those that the words are about."""
-    if tuple(robots) != lifted.robots:
-        raise lifted.position.fail(
-            f"the words are about {', '.join(lifted.robots)}, and the robots here are "
-            f"{', '.join(robots)}",
-            "Use a problem with these robots, or name them with --robots.",
-        )
-
-
-def grounded(
-    lifted: LiftedLanguage,
-    candidates: Candidates,
-    states: States,
-    known: Known,
-    producer: Mapping[str, Any],
-    *,
-    every_word: bool = False,
-) -> Language:
-    """The words of the states on plans of candidate tasks.
-
-    Unless the words are ``known`` to be verified, the language covers no task: it guarantees
-    nothing.  With ``every_word`` it has the words that no state here has, too.
-    """
-    partition = lifted.partition(states, every_word=every_word)
-    size = len(partition.words)
-    method = "lifted; not verified here" if known == "unknown" else f"lifted; {known} here"
-    provenance = provenance_of(candidates, Guarantee.of(method, size, 1), producer)
-    origin = {
-        "features": [str(feature) for feature in lifted.features],
-        "values": written_values(lifted.values),
-        "verified": [one.problem for one in lifted.verified],
-    }
-    provenance = replace(provenance, lifted=origin)
-    if known != "verified":
-        provenance = replace(provenance, tasks={"kind": "problems", "count": 0})
-    return Language.of(partition, candidates.model, provenance)
 
 
 #: What words of states are called whose values a language does not have.
