@@ -364,17 +364,23 @@ def failures_under(partition: Partition, candidates: Candidates, *, is_claimed: 
     """Count how often robots fail under words in all candidate tasks.
 
     If it ``is_claimed`` by a language file it is counted whatever the work is, up to `MOST`
-    additions; else only where that takes seconds.
+    additions; `TooManyToCount` if that cannot be.  Else only where that takes seconds.
     """
     if not is_claimed and estimate(candidates.source).is_large:
         return Failures(None, None, None, "there are too many tasks to do it at once")
     try:
         spaces = candidates.spaces
         words = [partition.word_of(space.rows)[space.state] for space in spaces]
-        return failures(spaces, words, MOST if is_claimed else _QUICKLY)
+        found = failures(spaces, words, MOST if is_claimed else _QUICKLY)
     except OutOfTime as error:
         stop_clock()
-        return Failures(None, None, None, error.what)
+        found = Failures(None, None, None, error.what)
+    if is_claimed and found.mean is None:
+        raise TooManyToCount(
+            f"what the language tolerates cannot be checked: {found.why_not}",
+            remedy="Say --tasks FILE with fewer tasks.",
+        )
+    return found
 
 
 def wilson(successes: int, runs: int) -> tuple[float, float]:
