@@ -142,12 +142,14 @@ def from_listed(
     options: ModelOptions | None = None,
     position: Position = TASKS_GIVEN,
     *,
+    kind: Kind = "file",
     skip_unsolvable: bool = False,
 ) -> Candidates:
     """The tasks of a task file; everything static comes from the problem.
 
     A small space is explored once for all of them; in a large one each task is searched by itself,
-    and of its initial state only state variables are checked (a note says what is not).
+    and of its initial state only state variables are checked (a note says what is not).  Those of
+    ``kind`` "problems", as a language file records them, are searched one by one.
 
     Raises `ProvedImpossible` for a task without a plan; with ``skip_unsolvable`` only if no other
     task is left.  Raises `BadInput` for an empty list, an atom that the problem does not have, or
@@ -156,6 +158,8 @@ def from_listed(
     if not listed:
         raise position.fail("the list of tasks is empty", "Give at least one task.")
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
+    if kind == "problems":
+        return _one_by_one(kind, loaded, listed, tasks)
     model, starts, inits = loaded.model, _inits(loaded.tasks), _inits(tasks)
     space = explored_if_small(model, starts)
     if space is None:
@@ -315,18 +319,6 @@ def _unsolvable(
         position=position,
         remedy=remedy,
     )
-
-
-def from_recorded(
-    domain: Domain,
-    problems: Sequence[Problem],
-    listed: Sequence[ListedTask],
-    options: ModelOptions | None = None,
-    position: Position = TASKS_GIVEN,
-) -> Candidates:
-    """Problems' tasks as a language file records them, searched one by one."""
-    loaded, tasks = model_of_listed(domain, problems, listed, options, position)
-    return _one_by_one("problems", loaded, listed, tasks)
 
 
 def describe(space: PlanSpace, task: int) -> str:

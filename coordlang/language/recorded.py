@@ -9,13 +9,7 @@ from typing import Any
 
 import msgspec
 
-from coordlang.language.candidates import (
-    Candidates,
-    all_pairs,
-    from_listed,
-    from_problems,
-    from_recorded,
-)
+from coordlang.language.candidates import Candidates, Kind, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask, first_of_equal, goal_text, ground_tasks
 from coordlang.language.provenance import domain_sha256, states_sha256, world_sha256
 from coordlang.language.words import Language
@@ -132,8 +126,7 @@ def recorded_candidates(
                 f"the language records {count} tasks but lists {len(listed)}",
                 remedy="Say --tasks all or --tasks FILE.",
             )
-        make = from_listed if kind == "file" else from_recorded
-        return make(domain, problems, listed, options, language.position)
+        return from_listed(domain, problems, listed, options, language.position, kind=kind)
     except BadInput as error:
         error.position = error.position or language.position
         raise
@@ -186,9 +179,10 @@ def with_recorded(language: Language, candidates: Candidates) -> Candidates:
     listed = [both[number] for number in first_of_equal(both)]
     if len(listed) == len(candidates.listed):
         return candidates
-    kinds = {candidates.kind, language.provenance.tasks["kind"]}
-    make = from_recorded if kinds == {"problems"} else from_listed
-    together = make(domain, problems, listed, candidates.loaded.options, language.position)
+    are_own = {candidates.kind, language.provenance.tasks["kind"]} == {"problems"}
+    kind: Kind = "problems" if are_own else "file"
+    options, position = candidates.loaded.options, language.position
+    together = from_listed(domain, problems, listed, options, position, kind=kind)
     return replace(together, skipped=candidates.skipped)
 
 
