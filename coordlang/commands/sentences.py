@@ -15,19 +15,15 @@ from coordlang.commands.plans import OptimalPlans, PlanSteps, show_listed
 from coordlang.commands.records import PlanOptions, SayOptions, UnderstandOptions
 from coordlang.commands.terminal import covered_code, echo
 from coordlang.execution.best_sentence import Preference, best_sentence, read_preference
-from coordlang.execution.guided_search import GuidedPlan, plan_under_sentence
+from coordlang.execution.guided_search import BOUND, GuidedPlan, plan_under_sentence
 from coordlang.execution.plan_sentence import PlanDag, sentence_of_plan
 from coordlang.execution.task_language import InTask, TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
-from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import json_count, read_plans
 from planners.search.plans import Plans, Texts, texts
 from planners.system.errors import CoordlangError, UsageError
 from planners.system.messages import counted
-
-#: The lower bound of A*.
-_BOUND = "relaxed"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -211,7 +207,7 @@ class PlanUnderSentence(InTask):
             {"expanded": own.expanded, "generated": own.generated, "states": own.states}
             for own in (self.search, self.without_sentence)
         ]
-        data["search"] = {"heuristic": _BOUND, **work[0], "without_sentence": work[1]}
+        data["search"] = {"heuristic": BOUND, **work[0], "without_sentence": work[1]}
         if self.fulfilled:
             data["wishes"] = [entry.data() for entry in self.fulfilled]
         return data
@@ -234,14 +230,13 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     preferences = [read_preference(used, text) for text in wishes_in(options.prefer)]
     best = best_sentence(used, preferences) if preferences else None
     words = best.words if best else used.words_of(sentence or ())
-    bound = HEURISTICS[_BOUND]
-    found = plan_under_sentence(used, words, bound)
+    found = plan_under_sentence(used, words)
     return PlanUnderSentence(
         used,
         used.text(words),
         texts(used.model.in_step, found.plan),
         found,
-        plan_under_sentence(used, None, bound),
+        plan_under_sentence(used, None),
         tuple(_fulfilled(preferences, best.values)) if best else (),
         SentencePlans(used, words),
     )
@@ -274,5 +269,5 @@ def show_plan(found: PlanUnderSentence, options: PlanOptions) -> int:
     if found.search.generated:  # else it is read off the plans
         expanded = counted(found.expanded, "node")
         without = f"without the sentence {found.without_sentence.expanded:,}"
-        echo(f"A* ({_BOUND}) expanded {expanded}; {without}", err=True)
+        echo(f"A* ({BOUND}) expanded {expanded}; {without}", err=True)
     return covered_code(found)

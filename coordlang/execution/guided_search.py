@@ -18,6 +18,8 @@ from planners.search.optimal_plans import rests
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 
+#: The lower bound of A* that is used where no other one is given.
+BOUND = "relaxed"
 #: (joint steps, second component of the cost).
 Cost = tuple[int, int]
 #: A state's row, the index in the sentence of its word, and the cost at which it was met.
@@ -48,7 +50,7 @@ class GuidedPlan:
 def plan_under_sentence(
     task_language: TaskLanguage,
     words: Sequence[int] | None,
-    bound: Bound = HEURISTICS["relaxed"],
+    bound: Bound = HEURISTICS[BOUND],
     *,
     count_words: bool = True,
 ) -> GuidedPlan:
