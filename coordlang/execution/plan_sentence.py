@@ -14,7 +14,7 @@ import numpy as np
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
 from coordlang.language.sentences import sentence
-from planners.joint.model import FullState, Goal, JointModel
+from planners.joint.model import FullState, Goal, JointModel, spelled
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import conjuncts, formula_text
 from planners.search.plan_file import NotAPlan, WholeStep, json_count, require_one_each
@@ -54,7 +54,7 @@ def sentence_of_plan(task_language: TaskLanguage, plan: Sequence[Texts]) -> tupl
     for step, labels in enumerate(Plans(space, node, []).of_steps(numbers) or numbers):
         edge = space.edge_with(node, labels)
         if edge is None:
-            raise _not_optimal(task_language, plan, rows, second, step)
+            raise _not_optimal(task_language, numbers, rows, second, step)
         node = space.target_of(edge)
         words.append(int(task_language.word[node]))
     return sentence(words)
@@ -121,7 +121,7 @@ def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ..
         if label is None:
             raise NotAPlan(
                 number,
-                f"in step {number + 1}, {name} has no subaction {text}",
+                f"in step {number + 1}, {name} has no subaction {spelled(text)}",
                 remedy="It is misspelt, belongs to another robot, can never be applied in this "
                 "problem, or is idling, which is left out (`coordlang inspect DOMAIN PROBLEM`).",
             )
@@ -138,7 +138,7 @@ def _unmet(model: JointModel, goal: Goal, row: Rows) -> str:
 
 
 def _not_optimal(
-    task_language: TaskLanguage, plan: Sequence[Texts], rows: Sequence[Rows], cost: int, step: int
+    task_language: TaskLanguage, plan: Plan, rows: Sequence[Rows], cost: int, step: int
 ) -> NotOptimal:
     """The error that says how much too expensive a plan is, and where it leaves optimal ones."""
     model, space = task_language.model.in_step, task_language.space
@@ -163,7 +163,7 @@ def _not_optimal(
         state = model.state_text(rows[step])
         doing = ", ".join(
             f"{robot} {text or 'idles'}"
-            for robot, text in zip(model.robots, plan[step], strict=True)
+            for robot, text in zip(model.robots, model.texts(plan[step]), strict=True)
         )
         kept = "plans within it" if model.slack else "optimal plans"
         reason = f"{wrong}; with step {step + 1} ({doing}) it leaves all {kept}, at {state}"

@@ -8,6 +8,7 @@ applicable, a whole table of states at a time.
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -280,10 +281,9 @@ class JointModel:
 
     def label_number(self, robot: int, text: str | None) -> int | None:
         """The number of a robot's label with this text (None: idling), None if there is none."""
-        if text is None:
-            return 0
         own = self.labels[robot]
-        return own.index(text) if text in own[1:] else None
+        said = text if text in own else spelled(text)
+        return own.index(said) if said in own else None
 
     def texts(self, labels: Sequence[int]) -> tuple[str | None, ...]:
         """Label numbers as text; None is idling."""
@@ -294,6 +294,12 @@ class JointModel:
         found = (self.label_number(robot, text) for robot, text in enumerate(texts))
         numbers = tuple(number for number in found if number is not None)
         return numbers if len(numbers) == len(self.labels) else None
+
+
+def spelled(text: str | None) -> str:
+    """The text of a label as models spell it: capitals and spaces do not matter; None is idling."""
+    said = IDLE if text is None else str(text).strip().lower()
+    return said if said == IDLE else "(" + " ".join(re.findall(r"[^\s()]+", said)) + ")"
 
 
 def show(atom: Atom | StepAtom) -> str:

@@ -330,6 +330,9 @@ class Timing:
         self._space, self._model = space, space.model
         self._traces = Traces(space.model.in_step)
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return Timing, (self._space,)  # traces keep what they found, which is found anew
+
     def steps(self, plan: Sequence[Step], states: Sequence[int]) -> tuple[Step, ...]:
         """The steps of a plan that does everything as soon as possible.
 

@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from planners.grounding.actions import GroundAction
-from planners.joint.model import IDLE, JointModel
+from planners.joint.model import JointModel
 from planners.pddl.model_options import Execution
 from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.errors import BadInput, Position, Refuted
@@ -164,7 +164,7 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
 
 
 def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
-    """The plans of a plan file, JSON or IPC text, in the spelling of the model.
+    """The plans of a plan file, JSON or IPC text.
 
     Raises `BadInput`, with the line, for a file that is no plan file or holds no plan, `NotAPlan`
     for an action that the problem does not have.
@@ -225,10 +225,7 @@ def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[T
         for number, step in enumerate(plan.actions):
             require_one_each(model, step, number, position)
     order = [robots.index(robot) for robot in model.robots]
-    return [
-        tuple(tuple(_spelled(step[k]) for k in order) for step in plan.actions)
-        for plan in file.plans
-    ]
+    return [tuple(tuple(step[k] for k in order) for step in plan.actions) for plan in file.plans]
 
 
 def require_one_each(
@@ -241,13 +238,6 @@ def require_one_each(
             position=position,
             remedy='As in ["(move r1 a b)", null]: null is a robot that idles.',
         )
-
-
-def _spelled(text: str | None) -> str | None:
-    """A subaction in the spelling of the model."""
-    if text is None or text.strip().lower() == IDLE:
-        return None
-    return "(" + " ".join(re.findall(r"[^\s()]+", text.lower())) + ")"
 
 
 def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:

@@ -246,11 +246,13 @@ def _check_kind(given: Option, value: object) -> None:
     kinds = get_args(given.kind) if _is_union(given.kind) else (given.kind,)
     if not _is_of(given.kind, value):
         expected = named([*map(_kind_text, kinds)], "or")
-        has_language = "Give the language of this result, .language."
-        raise UsageError(
-            f"{given.spelling}: expected {expected}, found {echoed(value)}",
-            remedy=has_language if hasattr(value, "language") else "Give another value.",
-        )
+        remedy = "Give another value."
+        if hasattr(value, "language"):
+            remedy = "Give the language of this result, .language."
+        elif given.spelling.endswith("..."):
+            remedy = "Give each of them as an argument of its own."
+        message = f"{given.spelling}: expected {expected}, found {echoed(value)}"
+        raise UsageError(message, remedy=remedy)
     is_path = any(get_origin(each) is PathLike for each in kinds)
     if is_path and isinstance(value, str | PathLike):
         path = fspath(value)

@@ -52,8 +52,7 @@ def test_plans(coordlang: Command) -> None:
     assert (plans.makespan, list(plans.robots)) == (listed["optimal_cost"], listed["robots"])
     assert plans.data(list(plans)) == listed
     assert plans[7] == next(islice(plans, 7, None))
-    assert plans.rank(plans[7]) == 7
-    assert plans.rank(plans[7][:-1]) is None
+    assert [plans.rank(plan) for plan in (plans[7], plans[7][:-1])] == [7, None]
     assert plans.sample(3, seed=1) == plans.sample(3, 1)
     assert all(plans.rank(plan) is not None for plan in plans.sample(5, seed=2))
     assert "makespan = 10" in plans.ipc(plans[0])
@@ -68,6 +67,7 @@ SENTENCE = "w0 w2 w1 w0"
 SAME: list[tuple[str, dict[str, Any], str]] = [
     ("inspect", {"states": True}, "--states"),
     ("plans", {"slack": np.int64(1)}, "--slack 1"),
+    ("plans", {"asynchronous": True}, "--asynchronous"),
     ("check", {}, ""),
     ("coordination", {}, ""),
     ("verify", {}, ""),
@@ -183,8 +183,9 @@ def test_tasks_as_objects(tmp_path: Path) -> None:
 
 def test_say_and_understand(language: Path, tmp_path: Path) -> None:
     plans = door.plans(*T_MAP)
-    said = {door.say(language, *T_MAP, plan).sentence for plan in plans}
-    assert said == {SENTENCE, "w0"}
+    capitals = [tuple((text or " idle ").upper() for text in step) for step in plans[1]]
+    said = {door.say(language, *T_MAP, plan).sentence for plan in (plans[0], capitals)}
+    assert (said, plans.rank(capitals)) == ({SENTENCE, "w0"}, 1)
     path = tmp_path / "plans.json"
     path.write_text(json.dumps(plans.data(list(plans))))
     several = door.say(language, *T_MAP, path)
@@ -194,8 +195,7 @@ def test_say_and_understand(language: Path, tmp_path: Path) -> None:
     left = door.understand(language, *T_MAP, SENTENCE)
     shows_itself(left)
     assert (left.count, left.sentence, left.covered) == (1, SENTENCE, True)
-    assert plans.rank(left[0]) is not None
-    assert len(left.dag().nodes) == 5
+    assert (plans.rank(left[0]), len(left.dag().nodes)) == (0, 5)
     assert door.plan(language, *T_MAP, SENTENCE).steps == left[0]
     with pytest.raises(door.NoPlanFits):
         door.understand(language, *T_MAP, "w0 w1")
@@ -302,9 +302,11 @@ def test_a_wrong_value_is_an_error_and_never_another_answer(
 
 def test_wrong_uses() -> None:
     problem = type("Problem", (), {})()  # of another library
-    for files in ((T_MAP[0],), (3, T_MAP[1]), (T_MAP[0], problem), (T_MAP[0], "\0")):
-        with pytest.raises(door.UsageError):
-            door.plans(*files)
+    one, two = T_MAP
+    for files in ((one,), (3, two), (one, problem), (one, "\0"), (one, [two, two])):
+        with pytest.raises(door.UsageError) as caught:
+            door.build(*files)
+    assert caught.value.remedy == "Give each of them as an argument of its own."
     # The second is the command line's alone.
     for unknown, more in (("costs", "; did you mean 'cost'"), ("as_json", "")):
         with pytest.raises(TypeError, match=rf"plans\(\) got an .* '{unknown}'{more}"):
@@ -314,10 +316,9 @@ def test_wrong_uses() -> None:
 
 
 def test_a_signature_names_what_python_takes() -> None:
-    names = [*inspect.signature(door.build).parameters]
-    assert names[:2] == ["domain", "problems"]
+    first, second, *names = inspect.signature(door.build).parameters
+    assert (first, second, "as_json" in names) == ("domain", "problems", False)
     assert {"factored", "cost", "robots", "method", "slack"} <= {*names}
-    assert "as_json" not in names
 
 
 # ---- what import coordlang gives, what it costs, and what hides it
