@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from itertools import groupby
 
 import numpy as np
@@ -14,14 +14,16 @@ import numpy as np
 from coordlang.language.words import Partition
 from planners.joint.tables import Floats, Ints
 from planners.search.plan_space import PlanSpace
+from planners.search.plans import counts
 from planners.system.errors import OutOfMemory
-from planners.system.limits import memory_left
 
 #: A sentence as word numbers.
 Sentence = tuple[int, ...]
 
 #: More sentences than this are not listed for one task, and no more additions made to count them.
 _MOST, _ADDITIONS = 100_000, 5_000_000
+#: In place of a node, and of its word: the plan ends.
+_END = -1
 
 
 def sentence(words: Iterable[int]) -> Sentence:
@@ -70,10 +72,42 @@ def task_sentences(
 
 
 def number_of_sentences(space: PlanSpace, word: Ints, start: int) -> int | None:
-    """How many sentences the plans from a node have, by the word of each node; None: too many."""
-    with suppress(OutOfMemory):
-        return len(sentence_counts(space, word, start=start, most_steps=_ADDITIONS)[start])
+    """How many sentences the plans from a node have, by the word of each node; None: too many.
+
+    Beginnings that lead to the same nodes are counted together: a deterministic automaton.
+    """
+    words, entered = [*word.tolist(), _END], _entered(space, word)  # the last one is that of `_END`
+    beginnings: dict[tuple[int, ...], int] = {(-start,): 1}
+    queue, steps = [*beginnings], 0
+    while steps < _ADDITIONS:
+        nodes = heappop(queue)  # negative: plans go to smaller numbers, so no others lead there
+        if nodes == (-_END,):
+            return beginnings[nodes]
+        after: dict[int, set[int]] = defaultdict(set)
+        for node in nodes:
+            steps += len(entered[-node])
+            for target in entered[-node]:
+                after[words[target]].add(-target)
+        for own in after.values():
+            there = tuple(sorted(own))
+            if there not in beginnings:
+                heappush(queue, there)
+            beginnings[there] = beginnings.get(there, 0) + beginnings[nodes]
     return None
+
+
+def _entered(space: PlanSpace, word: Ints) -> list[Counter[int]]:
+    """For each node those with which plans from it enter their next word, and in how many ways.
+
+    `_END` stands for the end of the plan.
+    """
+    words: list[int] = word.tolist()
+    entered: list[Counter[int]] = []
+    for node, layer in enumerate(space.layer.tolist()):
+        entered.append(Counter(() if layer else (_END,)))
+        for target in space.successors(node):
+            entered[node].update(entered[target] if words[target] == words[node] else (target,))
+    return entered
 
 
 def sentence_counts(
@@ -83,35 +117,28 @@ def sentence_counts(
     start: int | None = None,
     most_steps: int | None = None,
 ) -> dict[int, Counter[Sentence]]:
-    """Count the plans with each sentence, from the nodes of a plan space.
+    """Count the plans with each sentence, from a node of a plan space (default: all its starts).
 
-    Backward over the plan space, for all tasks at once: O(edges * sentences of a node).
-
-    ``word`` (nodes) is the word number of each node.  Counted are the plans from the nodes on plans
-    from ``start`` (default: from all nodes), with at most ``most_steps`` additions.
-
-    Returns for each node the sentences of the plans from it, the node's own word first, with the
-    exact numbers of these plans.  Raises `OutOfMemory` if that takes more additions.
+    ``word`` (nodes) is the word number of each node.  Returns for these nodes, and for those with
+    which plans from there enter a word, the sentences of the plans from it, the node's own word
+    first, with the exact numbers of these plans.  O(edges * sentences of a node), at most
+    ``most_steps`` additions: raises `OutOfMemory` if it takes more.
     """
-    words: list[int] = word.tolist()
-    nodes = np.arange(len(space))
-    if start is not None:
-        nodes = nodes[space.descendants(np.array([start]))]
-    counts: dict[int, Counter[Sentence]] = {}
-    steps = 0
-    for node in nodes.tolist():
-        if space.layer[node] == 0:
-            counts[node] = Counter({(words[node],): 1})
-            continue
-        total: Counter[Sentence] = Counter()
-        for target in space.successors(node):
-            steps += len(counts[target])
-            for rest, number in counts[target].items():
-                total[rest if rest[0] == words[node] else (words[node], *rest)] += number
+    entered, steps = _entered(space, word), 0
+    nodes = set(space.starts.tolist() if start is None else [start])
+    for node in reversed(range(len(space))):
+        if node in nodes:
+            nodes.update(entered[node])
+    counted = {_END: Counter[Sentence]({(): 1})}
+    for node in sorted(nodes - {_END}):
+        counted[node], own = Counter(), int(word[node])
+        for target, ways in entered[node].items():
+            steps += len(counted[target])
+            for rest, number in counted[target].items():
+                counted[node][own, *rest] += ways * number
         if most_steps is not None and steps > most_steps:
             raise _too_many()
-        counts[node] = total
-    return counts
+    return counted
 
 
 def _too_many() -> OutOfMemory:
@@ -133,8 +160,6 @@ def _choices(plans: PlanSpace) -> tuple[tuple[tuple[str | None, ...], ...], ...]
 # ---- how much a language leaves open, and how much it need not say
 
 
-#: What a sentence of a node takes while sentences are counted, in bytes, and the most that are.
-_SENTENCE, _MOST_COUNTED = 200, 20_000_000
 #: More plans than this are not told apart by the measures: it is near the largest float.
 MANY = 10**300
 
@@ -157,9 +182,8 @@ class Flexibility:
     steps of the task's plans.  Numbers of plans are floats with a relative error below 1e-12; a
     task with more than `MANY` counts as one with so many.
 
-    ``words[k]`` holds the word number of each node of ``spaces[k]``.  Measured from the plans
-    counted with each sentence: O(edges * sentences of a node).  Raises `OutOfMemory` when there are
-    too many sentences to count.
+    ``words[k]`` holds the word number of each node of ``spaces[k]``.  No sentence is listed: the
+    sum of the squares is the number of pairs of plans that have one sentence.
     """
 
     def __init__(self, spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> None:
@@ -181,18 +205,67 @@ class Flexibility:
 
 def _tasks(space: PlanSpace, word: Ints) -> Iterator[tuple[float, ...]]:
     """The measures of each task, in the order of the fields of `Flexibility`."""
-    most_steps = min(_MOST_COUNTED, memory_left() // _SENTENCE)
-    counted = sentence_counts(space, word, most_steps=most_steps)
+    entered, counted = _entered(space, word), counts(space)
+    #: The words of the sentences of all plans from each node.
+    said: list[int] = []
+    for plans, after in zip(counted, entered, strict=True):
+        said.append(plans + sum(n * said[node] for node, n in after.items() if node != _END))
+    alike = _pairs_alike(space.starts.tolist(), [*word.tolist(), _END], entered)
     for start in space.starts.tolist():
-        said = counted[start]
-        plans = said.total()
+        plans = counted[start]
         most = float(min(plans, MANY))
         first = sentence(word[space.nodes_on(start, space.first_path(start))].tolist())
         yield (
             plans,
-            most * (sum(number**2 for number in said.values()) / plans**2),
-            most * (said[first] / plans),
-            sum(number * len(words) for words, number in said.items()) / plans,
+            most * (alike[start, start] / plans**2),
+            most * (_plans_with(first, start, word, entered) / plans),
+            said[start] / plans,
             float(len(first)),
             int(space.layer[start]),
         )
+
+
+def _plans_with(words: Sentence, start: int, word: Ints, entered: Sequence[Counter[int]]) -> int:
+    """How many plans from a node have a sentence, which begins with the word of the node."""
+    begun = Counter({start: 1})
+    for own in words[1:]:
+        after = Counter[int]()
+        for node, number in begun.items():
+            for target, ways in entered[node].items():
+                if target != _END and word[target] == own:
+                    after[target] += number * ways
+        begun = after
+    return sum(number * entered[node][_END] for node, number in begun.items())
+
+
+def _pairs_alike(
+    starts: Iterable[int], words: Sequence[int], entered: Sequence[Counter[int]]
+) -> dict[tuple[int, int], int]:
+    """How many pairs of plans, one from each of two nodes, have one sentence.
+
+    For all pairs of nodes that such plans from one of the starts may enter a word with.
+    """
+    by_word: list[dict[int, list[tuple[int, int]]]] = []
+    for after in entered:
+        by_word.append(defaultdict(list))
+        for node, ways in after.items():
+            by_word[-1][words[node]].append((node, ways))
+    number = {(_END, _END): 1}
+    open_pairs = [(start, start) for start in starts]
+    while open_pairs:
+        one, other = pair = open_pairs[-1]
+        if pair in number:
+            open_pairs.pop()
+            continue
+        before, total = len(open_pairs), 0
+        for word in by_word[one].keys() & by_word[other].keys():
+            for target, ways in by_word[one][word]:
+                for target2, ways2 in by_word[other][word]:
+                    there = (target, target2) if target < target2 else (target2, target)
+                    if there in number:
+                        total += ways * ways2 * number[there]
+                    else:
+                        open_pairs.append(there)
+        if len(open_pairs) == before:
+            number[pair] = total
+    return number

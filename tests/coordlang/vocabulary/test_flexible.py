@@ -14,7 +14,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
-from coordlang.language.sentences import Flexibility
+from coordlang.language.sentences import Flexibility, number_of_sentences
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.flexible import flexibility_bounds, flexible
 from coordlang.vocabulary.job import Assignment, Outcome
@@ -50,18 +50,18 @@ def check_measures(candidates: Candidates, word: list[int]) -> int:
     measured = Flexibility(candidates.spaces, of_nodes(candidates, word))
     between = 0
     for number, (space, task, plans, sequences) in enumerate(listed(candidates)):
+        start, own = int(space.starts[task]), np.array(word)[space.state]
         said = [naive.sentence([word[s] for s in states]) for states in sequences]
-        sizes = [said.count(words) for words in said]
-        steps = int(space.layer[space.starts[task]])
+        assert number_of_sentences(space, own, start) == len(set(said))
         want = expected(sequences, word)
         between += 1 < want < len(plans)
         assert measured.plans[number] == len(plans)
         assert measured.expected[number] == pytest.approx(float(want), rel=1e-12)
-        assert measured.first[number] == pytest.approx(sizes[0], rel=1e-12)
+        assert measured.first[number] == pytest.approx(said.count(said[0]), rel=1e-12)
         assert measured.words[number] == pytest.approx(sum(map(len, said)) / len(said), rel=1e-12)
         assert measured.first_words[number] == len(said[0])
-        assert measured.steps[number] == steps == len(plans[0])
-        saving = sum(1 - Fraction(len(words), steps + 1) for words in said) / len(said)
+        assert measured.steps[number] == len(plans[0])
+        saving = sum(1 - Fraction(len(words), len(plans[0]) + 1) for words in said) / len(said)
         assert measured.saving[number] == pytest.approx(float(saving), abs=1e-12)
     assert len(measured.plans) == candidates.count
     return between
