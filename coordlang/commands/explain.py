@@ -185,7 +185,7 @@ class Explanation(InTask):
             for words, plans in leading:
                 lines.append(f'  "{used.text(words)}" leaves {counted(plans, "plan")} open.')
         if self.only is None and number != len(listed):
-            lines.append(f"  .. and {'more' if number is None else number - len(listed)}")
+            lines.append(f"  .. and {'more' if number is None else f'{number - len(listed):,}'}")
         return "\n".join(lines)
 
     def _demand_lines(self, sentences: Iterable[Sentence]) -> Iterator[str]:

@@ -19,7 +19,7 @@ from math import comb
 import numpy as np
 
 from coordlang.vocabulary.sat import Undecided, satisfiable
-from planners.joint.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.sat import sat_solver
 from planners.system.errors import CoordlangError
 
@@ -287,7 +287,7 @@ def _said(least: Bools, most: Bools) -> int:
 
 def _freed(points: Points, seed: Bools) -> Bools:
     """The box with as few variables limited as keep all ``off`` points out."""
-    packed = np.unique(np.packbits(points.blocked(seed, points.off), axis=1), axis=0)
+    packed, _ = unique_rows(np.packbits(points.blocked(seed, points.off), axis=1))
     outside = np.unpackbits(packed, axis=1, count=len(points.sizes)).astype(np.bool_)
     kept = _hitting(outside, [_said(seed[span], seed[span]) for span in points.spans])
     box = np.ones_like(seed)

@@ -44,12 +44,12 @@ class Literal:
     @property
     def is_negative(self) -> bool:
         """Whether it is shorter to list the values that it excludes."""
-        return len(self.others) < len(self.values)
+        return self.length < len(self.values)
 
     @property
     def length(self) -> int:
         """The number of values that its text mentions."""
-        return min(len(self.values), len(self.others))
+        return min(len(self.values), len(self.variable.values) - len(self.values))
 
     def conjunctions(self) -> list[Conjunction]:
         """The same as a disjunction of conjunctions of ground literals.

@@ -104,6 +104,7 @@ def unique_rows(table: NDArray[T]) -> tuple[NDArray[T], Ints]:
         else:
             codes[-1] *= np.uint64(bound)
             codes[-1] += column.astype(np.uint64)
+    codes = codes or [np.zeros(len(table), np.uint64)]  # without columns all rows are one
     order = codes[0].argsort() if len(codes) == 1 else np.lexsort(codes[::-1])
     fresh = differs(codes[0][order])
     for code in codes[1:]:
