@@ -225,8 +225,8 @@ def _exit_code(
 def _best(built: Built) -> str:
     """What is written when a search ends early."""
     what = "partition into words" if built.few_words else "language"
-    is_proved = built.guarantee.method in EXACT and built.guarantee.proved_minimal
-    return f"the best {what} so far is written{'' if is_proved else ', without proof'}"
+    proof = "" if built.guarantee.proved_minimal else ", without proof"
+    return f"the best {what} so far is written{proof}"
 
 
 def _written(built: Built, output: str, certificate: str | None = None) -> str:
