@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import isqrt
-from typing import Generic, TypeVar
 
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.sat import (
     PartitionProblem,
+    Requirement,
     Undecided,
     clique,
     most_constrained_first,
@@ -24,8 +24,6 @@ from coordlang.vocabulary.sat import (
     without_implied,
 )
 from planners.search.sat import SolverName
-
-Requirement = TypeVar("Requirement")
 
 #: A problem starts afresh when it has so many times the requirements that it started with.
 _GROWTH = 2
@@ -100,25 +98,21 @@ def close_bounds(
             budget = budget.doubled()
 
 
-class ProblemsBySize(Generic[Requirement]):
+class ProblemsBySize:
     """The partition problem of each number of words, kept as long as it is undecided.
 
     So a solver goes on where it stopped.
 
     ``known``: the requirements, a list that only grows.  ``start``: makes a problem for a number
-    with all that are known.  ``require``: adds one to a problem.  ``conflicts``: those of the
-    solvers so far.
+    with all that are known.  ``conflicts``: those of the solvers so far.
     """
 
     def __init__(
-        self,
-        known: Sequence[Requirement],
-        start: Callable[[int], PartitionProblem],
-        require: Callable[[PartitionProblem, Requirement], None],
+        self, known: Sequence[Requirement], start: Callable[[int], PartitionProblem]
     ) -> None:
-        self._known, self._start, self._require = known, start, require
-        #: Of each size a problem, and how many requirements it started with, and has.
-        self._kept: dict[int, tuple[PartitionProblem, int, int]] = {}
+        self._known, self._start = known, start
+        #: Of each size a problem, and how many requirements it started with.
+        self._kept: dict[int, tuple[PartitionProblem, int]] = {}
         self.conflicts = 0
 
     def find(self, size: int, conflicts: int) -> dict[int, int] | None:
@@ -127,13 +121,13 @@ class ProblemsBySize(Generic[Requirement]):
         Raises `Undecided` after so many ``conflicts`` of the solver.  When the requirements have
         grown much, the problem starts afresh: the order of its states was that of few.
         """
-        problem, at_start, known = self._kept.get(size, (None, 0, 0))
+        problem, at_start = self._kept.get(size, (None, 0))
         if problem is None or len(self._known) > _GROWTH * at_start:
             self.drop(size)
-            problem, at_start, known = self._start(size), len(self._known), len(self._known)
-        self._kept[size] = problem, at_start, len(self._known)
-        for requirement in self._known[known:]:
-            self._require(problem, requirement)
+            problem = self._start(size)
+            problem.required = at_start = len(self._known)
+            self._kept[size] = problem, at_start
+        problem.require(self._known)
         before = problem.conflicts
         try:
             return problem.solve(conflicts)
@@ -142,7 +136,7 @@ class ProblemsBySize(Generic[Requirement]):
 
     def drop(self, size: int) -> None:
         """Forget a number that is decided."""
-        problem, *_ = self._kept.pop(size, (None,))
+        problem, _ = self._kept.pop(size, (None, 0))
         if problem is not None:
             problem.close()
 
@@ -164,7 +158,7 @@ _COMPARISONS = 1_000_000
 _COMPARED_PAIRS = 100
 
 
-class Partitions(ProblemsBySize[Clause]):
+class Partitions(ProblemsBySize):
     """Partitions that satisfy all known clauses, by two solvers.
 
     The second one is allowed only one of symmetric partitions: proofs are ten times shorter, but
@@ -182,8 +176,9 @@ class Partitions(ProblemsBySize[Clause]):
         permutations: Sequence[Sequence[int]],
         prover: SolverName = "glucose42",
     ) -> None:
-        super().__init__(clauses, self._started, PartitionProblem.separate_one)
-        self._states, self._permutations, self._prover = states, permutations, prover
+        super().__init__(clauses, self._started)
+        self._states, self._clauses = states, clauses
+        self._permutations, self._prover = permutations, prover
         #: Numbers of words with which partitions are so few that the first solver finds none.
         self._hard: set[int] = set()
 
@@ -197,7 +192,7 @@ class Partitions(ProblemsBySize[Clause]):
         return super().find(size, conflicts)
 
     def _started(self, size: int) -> PartitionProblem:
-        clauses = without_implied(self._known, _COMPARISONS)
+        clauses = without_implied(self._clauses, _COMPARISONS)
         # States that every language tells apart name their words first: no others are symmetric.
         first = clique(pair for clause in clauses if len(clause) == 1 for pair in clause)
         others = most_constrained_first(set(self._states).difference(first), clauses)
@@ -206,6 +201,6 @@ class Partitions(ProblemsBySize[Clause]):
         for clause in clauses:
             problem.separate_one(clause)
         if size in self._hard:
-            pairs = most_frequent_pairs(self._known, _COMPARED_PAIRS)
+            pairs = most_frequent_pairs(self._clauses, _COMPARED_PAIRS)
             problem.add_lex_leaders(self._permutations, pairs)
         return problem

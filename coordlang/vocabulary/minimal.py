@@ -158,8 +158,7 @@ class MinimalSearch:
         """Who asks for all pairs of plans of one task; None where clauses must prove it."""
         if self._job.by_clauses or not self._is_one_task:
             return None
-        known = self.languages
-        return OneTask(self._job, known, self._bounds, self._left, self._holds, self._report)
+        return OneTask(self._job, self.languages, self)
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
@@ -258,7 +257,7 @@ class MinimalSearch:
             conflicts += self._one_task.work
         return conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
 
-    def _left(self) -> int:
+    def left(self) -> int:
         """Conflicts that may still be spent."""
         return max(0, self._most - self.work)
 
@@ -268,7 +267,7 @@ class MinimalSearch:
 
     @property
     def _is_spent(self) -> bool:
-        return self._left() == 0
+        return self.left() == 0
 
     def merge(self, vain: int = sys.maxsize, most: int = sys.maxsize) -> None:
         """Merge words of the best language as long as it stays a language.
@@ -288,7 +287,7 @@ class MinimalSearch:
                 if word_count(coarsest) <= _FEWER * self.upper:
                     self._offer(coarsest)  # what is not verified is lost when time is over
             self._merges += 1
-            self._report(f"merging words: {word_count(coarser)} left")
+            self.report(f"merging words: {word_count(coarser)} left")
             if self._is_spent or failed >= vain:
                 break
         if coarsest is not self.best:
@@ -356,15 +355,15 @@ class MinimalSearch:
         def partition(conflicts: int) -> dict[int, int] | None:
             if self._is_spent:
                 raise Undecided
-            return self._partitions.find(size, min(conflicts, self._left()))
+            return self._partitions.find(size, min(conflicts, self.left()))
 
-        return find(partition, self._holds, budget)
+        return find(partition, self.holds, budget)
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""
         if self._is_spent:
             return False
-        self._report(f"trying {size} words that some states decide")
+        self.report(f"trying {size} words that some states decide")
         found = self._tied.find(size, rounds)
         if found is not None:
             self._offer(found)
@@ -374,7 +373,7 @@ class MinimalSearch:
         """A proof by an instance that this one contains, the smallest that has one."""
         while size == self.lower and self._contained:
             instance = self._contained[0]
-            self._report(f"trying {size} words for {len(instance.states):,} of the states")
+            self.report(f"trying {size} words for {len(instance.states):,} of the states")
             refuting = instance.refute(size, budget)
             if refuting is not None:
                 return refuting
@@ -415,11 +414,13 @@ class MinimalSearch:
         self._job.check(partition)
         self.best = partition
 
-    def _holds(self, partition: Assignment) -> bool:
-        self._report(f"trying {word_count(partition)} words")
+    def holds(self, partition: Assignment) -> bool:
+        """Whether a partition is a language, see `Languages.holds`; it is said what is tried."""
+        self.report(f"trying {word_count(partition)} words")
         return self.languages.holds(partition)
 
-    def _report(self, what: str) -> None:
+    def report(self, what: str) -> None:
+        """Say what is tried, with what is known so far."""
         languages = self.languages
         self._job.progress(
             f"{what}, {self.lower} to {self.upper} needed: "

@@ -15,11 +15,12 @@ principle.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import cached_property, partial
 from itertools import chain, product
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -39,6 +40,9 @@ from coordlang.vocabulary.warped_pairs import (
 )
 from planners.joint.tables import Ints
 from planners.system.limits import memory_left
+
+if TYPE_CHECKING:
+    from coordlang.vocabulary.minimal import MinimalSearch
 
 #: Steps of mixtures of two plans that count as a conflict, and steps of formulas; each takes so
 #: many bytes at most.
@@ -65,23 +69,13 @@ _MOST_CLAUSES, _SMALL, _IN_STEP = 20_000_000, 4, Budget(rounds=8, conflicts=2_00
 class OneTask:
     """The searches for words of one task that ask for all pairs of its plans at once.
 
-    ``bounds`` gives the number of words proved to be needed and the number known to suffice,
-    ``left`` the conflicts that may still be spent; ``holds`` says whether a partition is a
-    language, ``report`` tells what is looked for.
+    ``search`` has the bounds on the number of words, and says what may still be spent.
     """
 
-    def __init__(
-        self,
-        job: Job,
-        languages: Languages,
-        bounds: Callable[[], tuple[int, int]],
-        left: Callable[[], int],
-        holds: Callable[[dict[int, int]], bool],
-        report: Callable[[str], None],
-    ) -> None:
+    def __init__(self, job: Job, languages: Languages, search: MinimalSearch) -> None:
         (space,) = job.candidates.spaces
         self._states, self._clauses, self._seed = job.states, languages.clauses, job.seed
-        self._bounds, self._left, self._holds, self._report = bounds, left, holds, report
+        self._search = search
         self._pairs = PlanPairs(Choices(space))
         self._two_words = TwoWords(self._pairs, self._states, self._clauses)
         #: Searches for stutter-free words, made one after another.
@@ -113,15 +107,15 @@ class OneTask:
 
         Raises `Undecided` where the ``budget`` is not enough, or there is no formula.
         """
-        rounds, left = budget.rounds, self._left()
+        rounds, left, conflicts = budget.rounds, self._search.left(), _FOR_MORE
         if size == 2:
-            own = Budget(rounds, min(_FOR_TWO * rounds, left))
-            room = self._room(_PAIRS_OF_ROUND * rounds, _PAIRS)
-            return self._two_words.find(self._holds, own, room)
-        if (apart := self._apart) is None:
+            room, conflicts = self._room(_PAIRS_OF_ROUND * rounds, _PAIRS), _FOR_TWO
+            partition = partial(self._two_words.find, room)
+        elif (apart := self._apart) is not None:
+            partition = partial(apart.find, size, size + _FURTHER)
+        else:
             raise Undecided
-        own = Budget(rounds, min(_FOR_MORE * rounds, left))
-        return find(partial(apart.find, size, size + _FURTHER), self._holds, own)
+        return find(partition, self._search.holds, Budget(rounds, min(conflicts * rounds, left)))
 
     def in_step(self, effort: int) -> Iterator[Assignment]:
         """Languages of fewer and fewer stutter-free words, that tell all pairs apart step by step.
@@ -129,23 +123,22 @@ class OneTask:
         From below, at most twice the number that was tried last: small ones are soon decided.
         """
         for search in chain(self._in_step[:], self._next_in_step):
-            least, upper = self._bounds()
+            least = self._search.lower
             most = 2 * least
-            while least < upper and self._left():
+            while least < (upper := self._search.upper) and (left := self._search.left()):
                 size = min(most, between(least, upper))
-                self._report(f"trying {size} words that tell plans apart step by step")
-                own = Budget(_IN_STEP.rounds, min(_IN_STEP.conflicts * effort, self._left()))
+                self._search.report(f"trying {size} words that tell plans apart step by step")
+                own = Budget(_IN_STEP.rounds, min(_IN_STEP.conflicts * effort, left))
                 room = min(4 * size, upper - 1)
                 if search.number_of_clauses(room) > self._room(_MOST_CLAUSES, _STEPS):
                     room = size
                 found = None
                 with suppress(Undecided):
-                    found = find(partial(search.find, size, room), self._holds, own)
+                    found = find(partial(search.find, size, room), self._search.holds, own)
                 if found is None:
                     least, most = size + 1, 2 * size
                 else:
                     yield found
-                    _, upper = self._bounds()
 
     def close(self) -> None:
         """Give back what the solvers hold."""
@@ -174,7 +167,7 @@ class OneTask:
 
     def _more_in_step(self) -> Iterator[PairsApart]:
         """Stutter-free words that tell pairs of plans apart: soon after one fails, then always."""
-        self._report("looking at pairs of plans")
+        self._search.report("looking at pairs of plans")
         if not self._pairs.complete(self._room(_MOST_PAIRS, _PAIRS)):
             return
         joined, most = joined_states(self._pairs.space), self._room(_MOST_CLAUSES, _STEPS)
@@ -187,14 +180,14 @@ class OneTask:
         with suppress(Undecided):
             for steps in tables():
                 search = PairsApart(self._states, self._clauses, steps, joined=joined)
-                if search.number_of_clauses(2 * self._bounds()[0]) > most:
+                if search.number_of_clauses(2 * self._search.lower) > most:
                     return
                 self._in_step.append(search)
                 yield search
 
     def _room(self, most: int, of_conflict: int) -> int:
         """Steps or clauses that may be made: at most so many, so many counted as a conflict."""
-        return min(most, of_conflict * self._left(), memory_left() // _BYTES)
+        return min(most, of_conflict * self._search.left(), memory_left() // _BYTES)
 
 
 # ---- two words
@@ -216,30 +209,27 @@ class TwoWords:
         self._formula: _Changes | None = None
         #: Whether the formula is of all pairs, and how many pairs of edges it is of.
         self._is_complete, self._known = False, 0
+        #: Whether it has left a partition that more pairs may refute.
+        self._is_answered = False
         self.conflicts = 0
 
-    def find(
-        self, holds: Callable[[dict[int, int]], bool], budget: Budget, most: int
-    ) -> dict[int, int] | None:
-        """The first partition that ``holds``, None if there is none.
+    def find(self, most: int, conflicts: int) -> dict[int, int] | None:
+        """A partition, None if there is none; the next one if it was refuted.
 
-        ``budget`` limits refuted partitions and the conflicts for each, ``most`` the pairs of edges
-        that are looked at in all.  Raises `Undecided` where that is not enough.
+        ``most`` limits the pairs of edges that are looked at in all, ``conflicts`` those of the
+        solver.  Raises `Undecided` where that is not enough.
         """
-        for _ in range(budget.rounds):
-            if self._formula is None:
-                self._formula = self._next_formula(most)
-            self._formula.require(self._clauses)
-            before = self._formula.conflicts
-            try:
-                found = self._formula.solve(budget.conflicts)
-            finally:
-                self.conflicts += self._formula.conflicts - before
-            if found is None or holds(found):
-                return found
-            if not self._is_complete:
-                self.close()
-        raise Undecided
+        if self._formula is None or (self._is_answered and not self._is_complete):
+            self.close()
+            self._formula, self._is_answered = self._next_formula(most), False
+        self._formula.require(self._clauses)
+        before = self._formula.conflicts
+        try:
+            found = self._formula.solve(conflicts)
+        finally:
+            self.conflicts += self._formula.conflicts - before
+        self._is_answered = True
+        return found
 
     def _next_formula(self, most: int) -> _Changes:
         wanted = max(_FIRST, _MORE * self._known)

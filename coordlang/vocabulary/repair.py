@@ -74,9 +74,7 @@ class _Repair:
         self._languages = Languages.of(job)
         self._changes_bound = 0
         self._new_words_bound = 0
-        self.problems = ProblemsBySize(
-            self._languages.clauses, self._start, PartitionProblem.separate_one
-        )
+        self.problems = ProblemsBySize(self._languages.clauses, self._start)
 
     def result(self, stopped: BaseException | None) -> Repair:
         """The best language, with what is proved of it.  Raises ``stopped`` if there is none."""

@@ -76,6 +76,9 @@ def clique(edges: Iterable[Pair]) -> list[int]:
     return best
 
 
+#: A clause, or alternatives of which all pairs of one must be separated.
+Requirement = Clause | Sequence[Clause]
+
 #: Conflicts after which the solver comes back, to let signals (time limit, Ctrl-C) be heard.
 _SLICE = 2_000
 
@@ -109,7 +112,8 @@ class PartitionProblem:
         self._last = 0
         self._solver = sat_solver(solver)
         self._word = {s: [self._new() for _ in range(size)] for s in states}
-        self._required = 0
+        #: How many requirements it has of a list that only grows.
+        self.required = 0
         self._separated: dict[Pair, int] = {}
         self._equivalent: set[Pair] = set()
         self._all_separated: dict[Clause, int] = {}
@@ -127,11 +131,14 @@ class PartitionProblem:
         """Require that one of these pairs of states lies in different words."""
         self._solver.add_clause([self._separate(p) for p in sorted(clause)])
 
-    def require(self, clauses: Sequence[Clause]) -> None:
-        """`separate_one` of what is new in a list that only grows: always the same one."""
-        for clause in clauses[self._required :]:
-            self.separate_one(clause)
-        self._required = len(clauses)
+    def require(self, known: Sequence[Requirement]) -> None:
+        """Require what is new in a list that only grows: always the same one."""
+        for new in known[self.required :]:
+            if isinstance(new, frozenset):
+                self.separate_one(new)
+            else:
+                self.separate_all_of_one(new)
+        self.required = len(known)
 
     def separate_all_of_one(self, alternatives: Sequence[Clause]) -> None:
         """Require that all pairs of one of these sets lie in different words."""

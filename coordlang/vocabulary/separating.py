@@ -69,9 +69,7 @@ class _Search:
         self._walks: list[DifferenceWalk] = []
         self._permutations: list[list[int]] = []
         self._random = np.random.default_rng(job.seed)
-        self.problems = ProblemsBySize(
-            self._known, self._start, PartitionProblem.separate_all_of_one
-        )
+        self.problems = ProblemsBySize(self._known, self._start)
         self._rounds = 0
 
     @property
@@ -172,8 +170,7 @@ class _Search:
         states = dict.fromkeys((*self._apart, *self._most_constrained_first()))
         # On these problems quicker than the other solver, by a third and more.
         problem = PartitionProblem(list(states), size, "glucose4")
-        for constraint in self._known:
-            problem.separate_all_of_one(constraint)
+        problem.require(self._known)
         return problem
 
     def _most_constrained_first(self) -> list[int]:

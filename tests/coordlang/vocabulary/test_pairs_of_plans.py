@@ -220,7 +220,7 @@ def suffice(job: Job) -> bool:
     languages = Languages.of(job)
     search = TwoWords(PlanPairs(Choices(space)), job.states, languages.clauses)
     with closing(search):
-        found = search.find(languages.holds, Budget(rounds=1_000), 10**6)
+        found = find(partial(search.find, 10**6), languages.holds, Budget(rounds=1_000))
     if found is not None:
         job.check(found)
     return found is not None
@@ -293,8 +293,8 @@ def test_few_pairs_prove_nothing_too_much_and_the_next_call_goes_on() -> None:
     search = TwoWords(PlanPairs(Choices(space)), np.unique(space.state).tolist(), [])
     with closing(search):
         with pytest.raises(Undecided):
-            search.find(lambda _: True, Budget(), 0)
-        assert search.find(lambda _: False, Budget(), 10**6) is None
+            search.find(0, 30_000)
+        assert find(partial(search.find, 10**6), lambda _: False, Budget()) is None
 
 
 @pytest.mark.parametrize("by_clauses", [False, True])
