@@ -111,23 +111,12 @@ class FailingTuples:
     def codes(
         self, word: Ints, agreeing: Sequence[Agreeing], most: int, random: np.random.Generator
     ) -> Ints:
-        """Clauses of images of agreeing tuples, about so many at most: a row for each.
+        """Clauses of agreeing tuples, see `clauses`, about so many at most: a row for each.
 
         (clauses, pairs) codes ``a * states + b`` with ``a < b``; -1 where there are fewer.
         """
-        total = sum(len(found.rows) for found in agreeing)
-        tables = []
-        for _, together in groupby(agreeing, key=lambda found: found.shape):
-            parts = []
-            for found in together:
-                rows = found.rows
-                share = max(1, len(rows) * most // max(total, most))
-                if share < len(rows):
-                    rows = random.permutation(rows)[:share]
-                parts.append(self.sequences(found, rows))
-            sequences = np.concatenate(parts)
-            pairs = _pairs(sequences, word[sequences], self.states)
-            tables.append(pairs[(pairs != -2).all(axis=1)])
+        share = most, sum(len(found.rows) for found in agreeing)
+        tables = [self._drawn(word, [found], share, random)[1] for found in agreeing]
         width = max(table.shape[1] for table in tables)
         wide = [np.pad(t, ((0, 0), (0, width - t.shape[1])), constant_values=-1) for t in tables]
         return np.concatenate(wide)
@@ -145,26 +134,36 @@ class FailingTuples:
         it is one of these images that the partition violates.
         """
         returned = max(_LEAST, _RETURNED // len(self.images))
-        most = _WARPED * returned
-        total = sum(len(found.rows) for found in agreeing)
+        share = _WARPED * returned, sum(len(found.rows) for found in agreeing)
         clauses: dict[Clause, Ints] = {}
         for shape, together in groupby(agreeing, key=lambda found: found.shape):
-            groups = list(together)
-            rows = np.concatenate([found.rows for found in groups])
-            image = np.repeat(np.arange(len(groups)), [len(found.rows) for found in groups])
-            share = max(1, len(rows) * most // max(total, most))
-            if share < len(rows):
-                drawn = random.permutation(len(rows))[:share]
-                rows, image = rows[drawn], image[drawn]
-            words = np.stack([word[found.to] for found in groups])
-            states = self.by_shape[shape][:, :, rows].transpose(2, 1, 0)
-            pairs = _pairs(states, words[image[:, None, None], states], self.states)
-            for row in np.flatnonzero((pairs != -2).all(axis=1)).tolist():
-                codes = {*pairs[row].tolist()} - {-1}
-                clause = frozenset(divmod(code, self.states) for code in codes)
-                clauses.setdefault(clause, self._sources[shape][rows[row]])
+            rows, pairs = self._drawn(word, list(together), share, random)
+            for row, codes in zip(rows.tolist(), pairs.tolist(), strict=True):
+                clause = frozenset(divmod(code, self.states) for code in {*codes} - {-1})
+                clauses.setdefault(clause, self._sources[shape][row])
         chosen = sorted(clauses, key=lambda c: (len(c), sorted(c)))[:returned]
         return {clause: self._evidence(*clauses[clause].tolist()) for clause in chosen}
+
+    def _drawn(
+        self,
+        word: Ints,
+        agreeing: Sequence[Agreeing],
+        share: tuple[int, int],
+        random: np.random.Generator,
+    ) -> tuple[Ints, Ints]:
+        """Tuples of one shape, so many of how many of all: rows, and the pairs in their clauses."""
+        rows = np.concatenate([found.rows for found in agreeing])
+        image = np.repeat(np.arange(len(agreeing)), [len(found.rows) for found in agreeing])
+        most, total = share
+        number = max(1, len(rows) * most // max(total, most))
+        if number < len(rows):
+            drawn = random.permutation(len(rows))[:number]
+            rows, image = rows[drawn], image[drawn]
+        words = np.stack([word[found.to] for found in agreeing])
+        states = self.by_shape[agreeing[0].shape][:, :, rows].transpose(2, 1, 0)
+        pairs = _pairs(states, words[image[:, None, None], states], self.states)
+        warped = (pairs != -2).all(axis=1)
+        return rows[warped], pairs[warped]
 
     def _evidence(self, batch: int, row: int) -> Evidence:
         space, edges = self._batches[batch]
