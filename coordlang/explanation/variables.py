@@ -18,7 +18,7 @@ import numpy as np
 from planners.joint.model import JointModel, own_text
 from planners.joint.tables import Bools, Ints, Rows, unique_rows
 from planners.pddl.lifted import Atom
-from planners.search.reachable import Exploration, PieceSizes
+from planners.search.reachable import Exploration
 
 #: States and joint steps looked at to find out what holds in all reachable states.
 _STATES = 20_000
@@ -94,7 +94,8 @@ def truth(model: JointModel, rows: Rows) -> tuple[tuple[Atom, ...], Bools]:
 
 def _surroundings(model: JointModel, rows: Rows) -> Rows:
     """The states and what can be reached from them, as far as the limits go."""
-    found = Exploration(model, unique_rows(rows)[0], PieceSizes(states=_AT_ONCE))
+    found = Exploration(model, unique_rows(rows)[0])
+    found.states_at_once = _AT_ONCE
     while len(found.layer) and len(found.table) < _STATES and found.composed < _STEPS:
         before = len(found.table)
         for _, steps in found.steps():

@@ -16,7 +16,7 @@ from planners.joint.model import JointModel, Options, PlanningTask, products
 from planners.joint.tables import Ints, Rows
 from planners.search.goals import FAR, searched
 from planners.search.heuristics import Heuristic
-from planners.search.reachable import Edges, Exploration, PieceSizes, Space, grown, joined_edges
+from planners.search.reachable import Edges, Exploration, Space, grown, joined_edges
 from planners.system.errors import ProvedImpossible
 
 if TYPE_CHECKING:
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 _NEVER = np.iinfo(np.int32).max
 #: In place of the layer of a state: no optimal plan passes through it.
 _LEFT_OUT = -1
+#: Joint steps of a search that may be bounded exactly, before it is; conflicts of a SAT solver that
+#: bounds it.
+_PROBE, _EFFORT = 100_000, 2_000_000
 #: States expanded first where the joint steps are limited.
 _FIRST_PROBED = 8
 #: Labels in all steps for which the solver's formula takes as long as the steps that are tried
@@ -44,13 +47,13 @@ _FIRST_PART, _LONGER = 32, 400
 _SAMPLED, _WAYS, _MOST = 50, 8, 0.5
 
 
-def probe_size(model: JointModel, bound: int, pieces: PieceSizes) -> int:
+def probe_size(model: JointModel, bound: int) -> int:
     """Joint steps after which a solver is asked, within a bound on the makespan.
 
     They are more where the formula for that is large.
     """
     size = sum(map(len, model.labels)) * (bound if bound < FAR - 1 else _STEPS)
-    return pieces.probe * (1 + size // _FORMULA)
+    return _PROBE * (1 + size // _FORMULA)
 
 
 class _GrownError(Exception):
@@ -65,14 +68,8 @@ class BoundedSearch(Exploration):
     last layer), and ``edges[k]`` lead from layer k to the next one.
     """
 
-    def __init__(
-        self,
-        model: JointModel,
-        task: PlanningTask,
-        heuristic: Heuristic,
-        pieces: PieceSizes,
-    ) -> None:
-        super().__init__(model, task.init[None, :], pieces)
+    def __init__(self, model: JointModel, task: PlanningTask, heuristic: Heuristic) -> None:
+        super().__init__(model, task.init[None, :])
         self._task, self._heuristic = task, heuristic
         self.rounds = self.bound = 0
         #: The least makespan that is not refuted: where rounds are left out, ``bound`` is larger.
@@ -134,8 +131,8 @@ class BoundedSearch(Exploration):
 
             question = ExactQuestion(self._model, self._task)
         is_first, self._question = self._question is None, question
-        effort = self._pieces.effort // (_FIRST_PART if is_first else 1)
-        self.exact = question.bound(self._least, effort, self._pieces)
+        effort = _EFFORT // (_FIRST_PART if is_first else 1)
+        self.exact = question.bound(self._least, effort)
         if self.exact is not None:
             return self.exact.makespan
         if is_first:
@@ -221,7 +218,7 @@ class BoundedSearch(Exploration):
     @property
     def _probe(self) -> int:
         """Joint steps that may be composed, where they are limited."""
-        return self._longer * probe_size(self._model, self.bound, self._pieces)
+        return self._longer * probe_size(self._model, self.bound)
 
     def so_far(self) -> str:
         """How far it got, for messages."""

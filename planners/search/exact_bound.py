@@ -23,14 +23,17 @@ from planners.joint.tables import Bools, Ints
 from planners.search.goals import SMALLER, goal_facts
 from planners.search.plan_formula import PlanFormula
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
-from planners.search.reachable import Edges, PieceSizes, grown
+from planners.search.reachable import Edges, grown
 from planners.system.limits import reaching
 
 #: What a refuted makespan costs in conflicts, however easy it is: of a task without plan there
 #: would be ever more; and the clauses of the formula that cost as much as a conflict.
 _EASY, _CLAUSES = 100, 1_000
-#: Conflicts for the least second component; without it more is searched.
-_LEAST_COST = 300_000
+#: Conflicts for the least second component, without which more is searched, and for one question
+#: about what optimal plans do.
+_LEAST_COST, _QUESTION = 300_000, 20_000
+#: Joint labels of a state beyond which it is asked which robots' labels may go on there.
+_JOINT_LABELS = 64
 #: States of a layer that are asked for first, and the share of them on optimal plans above which
 #: the others are not asked for.
 _SAMPLE, _MOSTLY = 64, 0.9
@@ -42,15 +45,15 @@ class ExactBound:
     """The least makespan of one task, and what its optimal plans consist of.
 
     ``plans`` are what they satisfy, closed with the `ExactQuestion`; ``used[k][robot]``
-    (labels) says which labels occur in step k of some optimal plan; a state is kept where the
-    conflicts that ``pieces`` allow do not answer its question.
+    (labels) says which labels occur in step k of some optimal plan; a state is kept where its
+    question is not answered with some effort.
 
     Of each state that a search has met a cheapest way is kept as its last step: what the way costs,
     the state before, and what the robots do there.
     """
 
-    def __init__(self, plans: FixedPlans, used: list[list[Bools]], pieces: PieceSizes) -> None:
-        self.plans, self.makespan, self._used, self._pieces = plans, plans.steps, used, pieces
+    def __init__(self, plans: FixedPlans, used: list[list[Bools]]) -> None:
+        self.plans, self.makespan, self._used = plans, plans.steps, used
         self._paid: Ints = np.zeros(0, np.int64)
         self._source: Ints = np.zeros(0, np.int64)
         self._labels: Labels = np.zeros((0, plans.first.shape[1]), np.int32)
@@ -64,7 +67,7 @@ class ExactBound:
         """
         used = [u[label] for u, (_, label) in zip(self._used[depth], options, strict=True)]
         options = some_options(options, used)
-        many = np.flatnonzero(products(options) > self._pieces.joint_labels)
+        many = np.flatnonzero(products(options) > _JOINT_LABELS)
         ways = self._asked(self._ways(states[many], depth))
         #: The variables of the robots' options, and which of these are left.
         variables = [
@@ -128,7 +131,7 @@ class ExactBound:
         return passes
 
     def _unless_refuted(self, literals: Literals) -> bool:
-        self.plans.left = self._pieces.question
+        self.plans.left = _QUESTION
         try:
             return self.plans.holds(literals)
         except OutOfEffort:
@@ -177,7 +180,7 @@ class ExactQuestion:
         """Give the solver back."""
         self._plans.close()
 
-    def bound(self, at_least: int, effort: int, pieces: PieceSizes) -> ExactBound | None:
+    def bound(self, at_least: int, effort: int) -> ExactBound | None:
         """The bound; None where it is not found with so many conflicts more.
 
         ``at_least`` is a lower bound on the makespan.  Of a task without plan none is found.
@@ -198,9 +201,9 @@ class ExactQuestion:
                     cheap = _least_cost(plans, _costly(plans, model, self._task, costs))
                     plan = plans.labels_chosen()
                     plans.require(cheap)
-            used = _used(plans, model, plan, pieces.question)
+            used = _used(plans, model, plan)
             plans.simplify()
-            return ExactBound(plans, used, pieces)
+            return ExactBound(plans, used)
 
     def _find_shortest(self, at_least: int) -> None:
         """Let the plans be the shortest ones, one of which was found."""
@@ -218,7 +221,7 @@ class ExactQuestion:
                 plans.spend(_EASY + plans.steps * len(self._formula.step) // _CLAUSES)
 
 
-def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:
+def _used(plans: FixedPlans, model: JointModel, plan: Plan) -> list[list[Bools]]:
     """Which labels occur where in optimal plans: each that is found shows one a robot and step.
 
     What is not decided may all occur.
@@ -233,7 +236,7 @@ def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list
     enter(plan)
     # A question about all steps at once is refuted in less time than one about each step.
     for robot in range(len(model.robots)):
-        plans.left = plans.steps * effort
+        plans.left = plans.steps * _QUESTION
         while others := [
             plans.label(step, robot, label)
             for step, own in enumerate(found)

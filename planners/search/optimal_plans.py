@@ -39,17 +39,17 @@ from planners.search.bounded_search import BoundedSearch
 from planners.search.goals import SMALLER, searched
 from planners.search.heuristics import search_heuristic
 from planners.search.plan_space import PlanSpace
-from planners.search.reachable import PIECES, Exploration, PieceSizes, Space
+from planners.search.reachable import Exploration, Space
 from planners.system.errors import ProvedImpossible, UsageError
 from planners.system.limits import reaching
 
 #: Goals whose distances are worked out together.
 _GOALS = 512
+#: (goal, state) pairs handled in one plan space when many tasks are asked for.
+PAIRS = 2_000_000
 
 
-def search(
-    model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES, heuristic: str = "auto"
-) -> PlanSpace:
+def search(model: JointModel, task: PlanningTask, heuristic: str = "auto") -> PlanSpace:
     """All optimal plans of one task, expanding only states that may be on one.
 
     Forward in layers, bounded by ``heuristic`` (`planners.search.heuristics`), then back along
@@ -59,16 +59,14 @@ def search(
     robots cannot wait in the goal.
     """
     if not model.slack:
-        return search_with_effort(model, task, pieces, heuristic)[0]
-    makespan, _ = search_with_effort(model.without_slack, task, pieces, heuristic)[0].cost_of(0)
-    return search_within(model, task, makespan, pieces)
+        return search_with_effort(model, task, heuristic)[0]
+    makespan, _ = search_with_effort(model.without_slack, task, heuristic)[0].cost_of(0)
+    return search_within(model, task, makespan)
 
 
-def search_within(
-    model: JointModel, task: PlanningTask, makespan: int, pieces: PieceSizes = PIECES
-) -> PlanSpace:
+def search_within(model: JointModel, task: PlanningTask, makespan: int) -> PlanSpace:
     """The plans of one task within the model's slack; ``makespan`` is the least one."""
-    space = explore_within(model, task, makespan + model.slack, pieces)
+    space = explore_within(model, task, makespan + model.slack)
     with reaching(lambda: f"the plans within slack, over {len(space):,} states", "less slack"):
         return _on_plans(_plan_space(space, [(task.goal, task.init[None, :])]))
 
@@ -80,12 +78,12 @@ def _on_plans(graph: PlanSpace) -> PlanSpace:
 
 
 def search_with_effort(
-    model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES, heuristic: str = "auto"
+    model: JointModel, task: PlanningTask, heuristic: str = "auto"
 ) -> tuple[PlanSpace, BoundedSearch]:
     """The plans as `search` finds them, and how they were found."""
     with reaching(lambda: f"looking for bounds of {task.name}", SMALLER):
         chosen = search_heuristic(heuristic, model, task)
-    forward = BoundedSearch(model, task, chosen, pieces)
+    forward = BoundedSearch(model, task, chosen)
     with closing(forward), reaching(forward.so_far, SMALLER):
         forward.run()
         graph = _plan_space(forward.space(), [(task.goal, task.init[None, :])])
@@ -126,7 +124,7 @@ def solvable(space: Space, tasks: Sequence[tuple[Goal, Rows]]) -> list[tuple[Goa
 
 def plan_spaces(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> Iterator[PlanSpace]:
     """`plan_space` in batches of goals."""
-    size = max(1, PIECES.pairs // max(1, len(space) * (1 + space.model.slack)))
+    size = max(1, PAIRS // max(1, len(space) * (1 + space.model.slack)))
     for start in range(0, len(tasks), size):
         yield plan_space(space, tasks[start : start + size])
 
@@ -265,9 +263,7 @@ def _shortest_ways(space: Space, distance: Ints, goal: Ints, state: Ints) -> Pla
 # ---- slack
 
 
-def explore_within(
-    model: JointModel, task: PlanningTask, steps: int, pieces: PieceSizes = PIECES
-) -> Space:
+def explore_within(model: JointModel, task: PlanningTask, steps: int) -> Space:
     """The states and joint steps of all plans of a task with at most so many steps, and some more.
 
     A state is kept if the steps to it and a lower bound on the steps from it are within ``steps``.
@@ -275,7 +271,7 @@ def explore_within(
     joint steps are those between states that are kept.
     """
     heuristic = search_heuristic("auto", model, task)
-    found = Exploration(model, task.init[None, :], pieces)
+    found = Exploration(model, task.init[None, :])
 
     def so_far() -> str:
         return f"{found.states:,} states within {found.depth} of {steps} steps of {task.name}"

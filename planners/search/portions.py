@@ -20,6 +20,7 @@ from planners.parallel.batch import digest
 from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import model_digest
 from planners.search.optimal_plans import (
+    PAIRS,
     distances,
     distances_to,
     plan_space,
@@ -27,7 +28,7 @@ from planners.search.optimal_plans import (
     seen_rows,
 )
 from planners.search.plan_space import PlanSpace
-from planners.search.reachable import PIECES, Space
+from planners.search.reachable import Space
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
 
@@ -195,7 +196,7 @@ class Estimate:
     @property
     def bytes(self) -> int:
         """About so much: finished nodes with their edges, and one batch while it is made."""
-        return _NODE_BYTES * self.nodes + _MAKING_BYTES * min(self.nodes, PIECES.pairs)
+        return _NODE_BYTES * self.nodes + _MAKING_BYTES * min(self.nodes, PAIRS)
 
     @property
     def is_large(self) -> bool:

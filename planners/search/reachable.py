@@ -31,28 +31,6 @@ _MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 FEWER = "fewer objects or robots"
 
 
-@dataclass(frozen=True, slots=True)
-class PieceSizes:
-    """How much is handled at a time: bounds of memory and work, which change no result."""
-
-    #: States expanded at a time, and the joint steps that this should give.
-    states: int = 20_000
-    steps: int = 4_000_000
-    #: (goal, state) pairs handled in one plan space when many tasks are asked for.
-    pairs: int = 2_000_000
-    #: Joint steps of a forward search that may be bounded exactly, before it is.
-    probe: int = 100_000
-    #: Conflicts that a SAT solver may spend on these bounds, and on one question about what optimal
-    #: plans do.
-    effort: int = 2_000_000
-    question: int = 20_000
-    #: Joint labels of a state beyond which it is asked which robots' labels may go on there.
-    joint_labels: int = 64
-
-
-PIECES = PieceSizes()
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Space:
     """All states reachable from some initial states, with every joint step between them.
@@ -185,11 +163,14 @@ class Exploration:
 
     ``table`` numbers the states that were met; ``layers`` are the numbers of those that were
     entered, by their distance from the initial states; ``edges`` are the joint steps that were
-    kept, of ``composed`` in all.
+    kept, of ``composed`` in all.  ``states_at_once`` are expanded at most, which should give
+    ``steps_at_once`` joint steps: that changes no result.
     """
 
-    def __init__(self, model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> None:
-        self._model, self._pieces = model, pieces
+    states_at_once, steps_at_once = 20_000, 4_000_000
+
+    def __init__(self, model: JointModel, inits: Rows) -> None:
+        self._model = model
         self.table = StateTable(model.codec.width)
         self.table.add(inits)
         self.layers: list[Ints] = [np.arange(len(self.table))]
@@ -219,9 +200,9 @@ class Exploration:
         The first piece are ``first`` states; how many steps these have says how long the next
         pieces may be, to have ``most`` each.
         """
-        room = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
+        room = max(1, min(self.steps_at_once, _BYTES // (8 * self._model.codec.width)))
         most = min(room, most or room)
-        states, start, size = self.layers[-1], 0, min(self._pieces.states, first)
+        states, start, size = self.layers[-1], 0, min(self.states_at_once, first)
         while start < len(states):
             numbers = states[start : start + size]
             chosen = None if only is None else partial(only, numbers)
@@ -229,7 +210,7 @@ class Exploration:
             self.composed += len(steps)
             yield numbers, steps
             start += size
-            size = max(1, min(self._pieces.states, most * size // max(1, len(steps))))
+            size = max(1, min(self.states_at_once, most * size // max(1, len(steps))))
 
     def expand(self, only: Only | None = None, *, keep: bool = True) -> Ints:
         """The states that the layer's joint steps lead to and that were not met before.
@@ -270,24 +251,24 @@ class Exploration:
         return Space(self._model, rows, first, of_state[target], labels.astype(np.int32), cost)
 
 
-def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Space:
+def explore(model: JointModel, inits: Rows) -> Space:
     """Breadth-first search from all ``inits`` (a table of rows) to the end.
 
     Time and memory are linear in the number of joint steps.
     """
-    found = Exploration(model, inits, pieces)
+    found = Exploration(model, inits)
     with reaching(found.so_far, FEWER):
         while len(found.layers[-1]):
             found.layers.append(found.expand())
         return found.space()
 
 
-def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[int, int]:
+def count(model: JointModel, inits: Rows) -> tuple[int, int]:
     """How many states `explore` finds, and how many joint steps between them.
 
     Needs only the memory that the states take.
     """
-    found = Exploration(model, inits, pieces)
+    found = Exploration(model, inits)
     with reaching(found.so_far, FEWER):
         while len(found.layers[-1]):
             found.layers.append(found.expand(keep=False))

@@ -11,7 +11,7 @@ from planners.joint.tables import Rows, unique_rows
 from planners.search.bounded_search import probe_size
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import relaxed, search_heuristic
-from planners.search.reachable import PIECES, Exploration
+from planners.search.reachable import Exploration
 
 #: Joint steps composed for all layers together, at most.
 _STEPS = 100_000
@@ -110,7 +110,7 @@ def estimate(
         heuristic=heuristic.name,
         at_least=_finite(bound),
         within=tuple(_within(heuristic.value, layers, bound)),
-        solver_after=probe_size(model, bound, PIECES) if heuristic.exact else None,
+        solver_after=probe_size(model, bound) if heuristic.exact else None,
     )
     return found, layers
 

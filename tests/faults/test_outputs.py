@@ -211,10 +211,7 @@ def test_every_rename_may_be_the_last_one(
         if calls == at and comes:
             os.kill(os.getpid(), number)
 
-    def before() -> None:
-        os.replace = ending  # type: ignore[assignment]
-
-    ended = fork_command(*BUILD, *PAIR, before=before).join()
+    ended = fork_command(*BUILD, *PAIR, before=partial(setattr, os, "replace", ending)).join()
     if number == signal.SIGKILL:
         assert (ended.code, _pair(old_pair)) == (-number, LAST[at, comes])
         return
@@ -229,10 +226,7 @@ def test_an_interrupt_of_a_full_disk_says_of_no_language_that_it_is_written(old_
         os.kill(os.getpid(), signal.SIGINT)
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    def before() -> None:
-        os.replace = fail  # type: ignore[assignment]
-
-    ended = fork_command(*BUILD, *PAIR, before=before).join()
+    ended = fork_command(*BUILD, *PAIR, before=partial(setattr, os, "replace", fail)).join()
     assert (ended.code, _pair(old_pair)) == (130, "old")
     assert ended.err.strip() == "coordlang: interrupted"
 
@@ -246,9 +240,7 @@ def test_signals_are_heard_while_a_pipe_is_written_to(device: str, here: Path) -
         os.kill(os.getpid(), signal.SIGINT)
         return made(language)
 
-    def before() -> None:
-        file.to_bytes = interrupted
-
+    before = partial(setattr, file, "to_bytes", interrupted)
     places = {"-o": "l.json", "--certificate": "c.json", device: "/dev/null"}
     ended = fork_command(*BUILD, *chain(*places.items()), before=before).join()
     assert ended.code == 130

@@ -17,7 +17,7 @@ from planners.joint.composition import ComposingStepper
 from planners.loading import PlanningInstance
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
-from planners.search.reachable import PieceSizes, count, explore
+from planners.search.reachable import Exploration, count, explore
 from planners.system import limits
 from planners.system.errors import OutOfMemory, OutOfTime
 from tests.support.domains import loaded_from
@@ -253,12 +253,14 @@ def test_exploring_says_how_far_it_got(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def test_exploring_in_pieces_is_the_same_work() -> None:
-    loaded, small = loaded_from("grid", "corners-4x4"), PieceSizes(states=7, steps=40)
+def test_exploring_in_pieces_is_the_same_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = loaded_from("grid", "corners-4x4")
     init = loaded.tasks[0].init[None, :]
     space = explore(loaded.model, init)
-    assert count(loaded.model, init, small) == (len(space), len(space.target))
-    again = explore(loaded.model, init, small)
+    monkeypatch.setattr(Exploration, "states_at_once", 7)
+    monkeypatch.setattr(Exploration, "steps_at_once", 40)
+    assert count(loaded.model, init) == (len(space), len(space.target))
+    again = explore(loaded.model, init)
     for name in ("rows", "first", "target", "labels", "cost"):
         assert (getattr(again, name) == getattr(space, name)).all(), name
 

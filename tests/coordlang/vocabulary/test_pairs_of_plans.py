@@ -218,8 +218,7 @@ def suffice(job: Job) -> bool:
     """Whether the search for two words finds a language, which is verified."""
     (space,) = job.candidates.spaces
     languages = Languages.of(job)
-    search = TwoWords(PlanPairs(Choices(space)), job.states, languages.clauses)
-    with closing(search):
+    with closing(TwoWords(PlanPairs(Choices(space)), job.states, languages.clauses)) as search:
         found = find(partial(search.find, 10**6), languages.holds, Budget(rounds=1_000))
     if found is not None:
         job.check(found)
@@ -229,11 +228,9 @@ def suffice(job: Job) -> bool:
 def fewest(job: Job) -> int:
     """The fewest words of which some tell all pairs of plans apart, and are a language."""
     languages, pairs = Languages.of(job), WarpedPairs(grown(job.candidates.spaces[0]), 99)
-    draws, size = np.random.default_rng(0), 2
+    draws, size, holds = np.random.default_rng(0), 2, languages.holds
     with closing(PairsApart(job.states, languages.clauses, pairs.steps(), draws)) as search:
-        while (
-            found := find(partial(search.find, size, size + 1), languages.holds, Budget())
-        ) is None:
+        while (found := find(partial(search.find, size, size + 1), holds, Budget())) is None:
             size += 1
     job.check(found)
     return size
@@ -290,8 +287,8 @@ def test_as_few_words_of_random_models_suffice_as_of_all_partitions(
 
 def test_few_pairs_prove_nothing_too_much_and_the_next_call_goes_on() -> None:
     (space,) = bells(EQUAL, EQUAL).spaces
-    search = TwoWords(PlanPairs(Choices(space)), np.unique(space.state).tolist(), [])
-    with closing(search):
+    states = np.unique(space.state).tolist()
+    with closing(TwoWords(PlanPairs(Choices(space)), states, [])) as search:
         with pytest.raises(Undecided):
             search.find(0, 30_000)
         assert find(partial(search.find, 10**6), lambda _: False, Budget()) is None

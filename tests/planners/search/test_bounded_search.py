@@ -10,15 +10,17 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from random import Random
+from typing import Any
 
 import pytest
 
 from planners.loading import PlanningInstance
 from planners.pddl.model_options import Cost, ModelOptions
+from planners.search import bounded_search, exact_bound
 from planners.search.heuristics import CHOICES
 from planners.search.optimal_plans import search, search_with_effort
 from planners.search.plans import counts
-from planners.search.reachable import PIECES
+from planners.search.reachable import Exploration
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.domains import world_of
 from tests.support.random_models import random_threes
@@ -27,16 +29,16 @@ from tests.support.texts import model_of
 
 #: Searches that ask the solver at once, with effort for all or some of its answers, and one in small
 #: pieces.
-PIECE_SIZES = (
-    PIECES,
-    replace(PIECES, probe=0, effort=3_000),
-    replace(PIECES, probe=0, effort=20_000, states=3, joint_labels=0),
-    replace(PIECES, states=2, steps=5),
-    replace(PIECES, probe=0, effort=20_000, question=0, joint_labels=0),
-    replace(PIECES, probe=0, effort=300, question=0),
-    replace(PIECES, probe=1, effort=4_000),
+SIZES = (
+    dict[str, int](),
+    {"_PROBE": 0, "_EFFORT": 3_000},
+    {"_PROBE": 0, "_EFFORT": 20_000, "states_at_once": 3, "_JOINT_LABELS": 0},
+    {"states_at_once": 2, "steps_at_once": 5},
+    {"_PROBE": 0, "_EFFORT": 20_000, "_QUESTION": 0, "_JOINT_LABELS": 0},
+    {"_PROBE": 0, "_EFFORT": 300, "_QUESTION": 0},
+    {"_PROBE": 1, "_EFFORT": 4_000},
 )
-ASKING = [pieces for pieces in PIECE_SIZES if pieces.probe == 0]
+ASKING = [sizes for sizes in SIZES if sizes.get("_PROBE") == 0]
 COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions", "makespan+cost")
 
 
@@ -102,14 +104,21 @@ def rooms(seed: int) -> PlanningInstance:
     return model_of(text, problem, ModelOptions(cost=random.choice((*COSTS[1:], "makespan+cost"))))
 
 
+def sized(sizes: dict[str, int], search: Callable[..., Any], *asked: object) -> Any:
+    with pytest.MonkeyPatch.context() as patch:
+        for name, size in sizes.items():
+            owners = (bounded_search, exact_bound, Exploration)
+            patch.setattr(next(owner for owner in owners if hasattr(owner, name)), name, size)
+        return search(*asked)
+
+
 def compared(models: Iterable[PlanningInstance | None]) -> Counter[str]:
     met: Counter[str] = Counter()
     for number, loaded in enumerate(models):
         if loaded is None:
             continue
         model, task = loaded.model, loaded.tasks[0]
-        pieces = PIECE_SIZES[number % len(PIECE_SIZES)]
-        searches = [(pieces, heuristic) for heuristic in CHOICES]
+        searches = [(SIZES[number % len(SIZES)], heuristic) for heuristic in CHOICES]
         if loaded.domain.name == "rooms":  # made for what the solver is asked
             searches = [(asking, "auto") for asking in ASKING[number % 2 :: 2]]
         try:
@@ -118,13 +127,13 @@ def compared(models: Iterable[PlanningInstance | None]) -> Counter[str]:
             continue
         except ProvedImpossible:
             met["unsolvable"] += 1
-            for pieces, heuristic in searches:
+            for sizes, heuristic in searches:
                 with pytest.raises(ProvedImpossible):
-                    search(model, task, pieces, heuristic)
+                    sized(sizes, search, model, task, heuristic)
             continue
         met["solved" if len(twin) > 1 else "at the goal"] += 1
-        for pieces, heuristic in searches:
-            found = search(model, task, pieces, heuristic)
+        for sizes, heuristic in searches:
+            found = sized(sizes, search, model, task, heuristic)
             assert (found.rows[found.state] == twin.rows[twin.state]).all()
             equal(found, replace(twin, rows=found.rows, state=found.state))
     return met
@@ -177,8 +186,8 @@ def test_a_bound_that_was_left_out_is_not_taken_as_refuted() -> None:
     loaded = model_of(JOBS, problem, ModelOptions(cost="makespan+actions"))
     asked = 0
     for probe in range(500, 5_000, 250):
-        pieces = replace(PIECES, probe=probe)
-        plans, effort = search_with_effort(loaded.model, loaded.tasks[0], pieces)
+        asking = {"_PROBE": probe}
+        plans, effort = sized(asking, search_with_effort, loaded.model, loaded.tasks[0])
         assert plans.cost_of(0) == (6, 8)
         asked += "SAT" in effort.bounded_by
     assert asked >= 10
@@ -186,7 +195,7 @@ def test_a_bound_that_was_left_out_is_not_taken_as_refuted() -> None:
 
 def test_on_open_grids_no_solver_is_asked() -> None:
     task = world_of("grid", "corners-8x8").loaded
-    plans, effort = search_with_effort(task.model, task.tasks[0], replace(PIECES, probe=400))
+    plans, effort = sized({"_PROBE": 400}, search_with_effort, task.model, task.tasks[0])
     assert (counts(plans)[int(plans.starts[0])], effort.rounds) == (8_383_608, 2)
     assert "SAT" not in effort.bounded_by
 
