@@ -187,6 +187,16 @@ def _closure(generators: Sequence[Symmetry], largest: int) -> list[Symmetry] | N
     return group
 
 
+def orbits(permutations: Sequence[Ints]) -> Ints:
+    """(elements) the least of the elements that permutations take to each other."""
+    before, orbit = np.zeros(0, np.int64), np.arange(len(permutations[0]))
+    while not np.array_equal(orbit, before):
+        before = orbit
+        for to in permutations:
+            orbit = np.minimum(orbit, orbit[to])
+    return orbit
+
+
 # ---- is a renaming a symmetry?
 
 

@@ -20,7 +20,7 @@ from networkx.algorithms.isomorphism import GraphMatcher
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause
 from coordlang.symmetry.graph import Renaming, joined_order
-from coordlang.symmetry.group import SymmetryGroup, symmetries_of_part
+from coordlang.symmetry.group import SymmetryGroup, orbits, symmetries_of_part
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.languages import Languages, ends
 from coordlang.vocabulary.loop import Budget, Partitions, find
@@ -120,8 +120,7 @@ def tasks_of_one_orbit(
     """
     if not group.symmetries:
         return []
-    states = np.arange(len(candidates.rows))
-    orbit = np.minimum.reduce([states, *(symmetry.states for symmetry in group.symmetries)])
+    orbit = orbits([symmetry.states for symmetry in group.symmetries])
     found = []
     for space in candidates.spaces:
         of_plans = _orbit_of_plans(space, orbit)[space.starts]

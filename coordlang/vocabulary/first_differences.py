@@ -18,12 +18,11 @@ from coordlang.language.candidates import Candidates
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import TooManyDivergences, divergences, minimal
 from coordlang.required.miscoordination import Inseparable
-from coordlang.symmetry.group import checked_generators
+from coordlang.symmetry.group import checked_generators, orbits
 from coordlang.verification.by_definition import inseparable, refuting_goal
 from planners.joint.tables import Ints, find_rows, unique_rows
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
-from planners.search.graphs import orbits
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import PORTION, Explored, Source, cut
 from planners.system.limits import reaching
@@ -236,6 +235,4 @@ def symmetric_goals(
     generators = [s.states for s in found if (s.states != np.arange(states)).any()]
     if not generators:
         return None
-    orbit = orbits(generators)
-    _, first = np.unique(orbit, return_index=True)
-    return SymmetricGoals(tuple(generators), first[orbit])
+    return SymmetricGoals(tuple(generators), orbits(generators))

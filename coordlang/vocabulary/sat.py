@@ -17,6 +17,7 @@ import numpy as np
 from coordlang.language.warping import Clause, Pair, pair
 from planners.joint.tables import Ints
 from planners.search.sat import SolverName, sat_solver, solve_slice
+from planners.system.limits import address_space_left
 
 
 def without_implied(clauses: Iterable[Clause], comparisons: int = sys.maxsize) -> list[Clause]:
@@ -81,6 +82,8 @@ Requirement = Clause | Sequence[Clause]
 
 #: Conflicts after which the solver comes back, to let signals (time limit, Ctrl-C) be heard.
 _SLICE = 2_000
+#: Bytes without which a solver is not asked: one that gets no memory ends the process.
+_ROOM = 32 << 20
 
 
 #: The places where two plans that fail together begin to differ, and where both have ended.
@@ -324,6 +327,8 @@ def satisfiable(solver: Any, assumptions: Sequence[int] = (), conflicts: int | N
     work.  ``assumptions``: literals that are assumed besides.  ``conflicts``: conflicts of the
     solver that are allowed, None without limit.  Raises `Undecided` after so many conflicts.
     """
+    if address_space_left() < _ROOM:
+        raise MemoryError
     spent = 0
     while conflicts is None or spent < conflicts:
         answer = solve_slice(solver, _SLICE, assumptions)

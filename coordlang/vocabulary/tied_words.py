@@ -18,12 +18,12 @@ from itertools import tee
 import numpy as np
 
 from coordlang.language.candidates import Candidates
+from coordlang.symmetry.group import orbits
 from coordlang.vocabulary.job import Assignment, Job, words_of_states
 from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.loop import Budget, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, unique_rows
-from planners.search.graphs import orbits
 from planners.search.sat import whole
 
 #: Clauses that are taken of a refuted partition, before their images; and failing tuples after

@@ -6,12 +6,8 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
-from planners.joint.tables import Ints
 from planners.system.errors import OutOfMemory
 from planners.system.limits import address_space_left, more_memory
 
@@ -19,21 +15,6 @@ from planners.system.limits import address_space_left, more_memory
 _LIBRARY = 192 << 20
 #: How many threads BLAS starts, for the time in which it is loaded.
 _THREADS = "OPENBLAS_NUM_THREADS"
-
-
-def orbits(permutations: Sequence[Ints]) -> Ints:
-    """(elements) a number for each set of elements that permutations take to each other.
-
-    Raises `OutOfMemory` as `csgraph` does.
-    """
-    sparse = csgraph()
-    from scipy.sparse import csr_matrix
-
-    size, targets = len(permutations[0]), np.concatenate(permutations)
-    sources = np.tile(np.arange(size), len(permutations))
-    graph = csr_matrix((np.ones(len(targets)), (sources, targets)), (size, size))
-    orbit: Ints = sparse.connected_components(graph, directed=False)[1]
-    return orbit
 
 
 def csgraph() -> Any:

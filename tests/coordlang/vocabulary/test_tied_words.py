@@ -20,7 +20,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Pair
 from coordlang.language.words import Partition
-from coordlang.symmetry.group import symmetry_group
+from coordlang.symmetry.group import orbits, symmetry_group
 from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from coordlang.vocabulary.first_differences import first_differences
@@ -32,7 +32,6 @@ from coordlang.vocabulary.tied_words import TiedWords, _Kind, classes_by_facts
 from planners.joint.tables import Ints
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
-from planners.search.graphs import orbits
 from tests.support.candidates import failing, is_language, small_candidates
 from tests.support.domains import all_tasks, own_task
 
