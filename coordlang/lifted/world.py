@@ -22,7 +22,7 @@ from planners.joint.states import TrueFacts
 from planners.joint.tables import Bools, Ints, Rows
 from planners.pddl.lifted import Domain, Problem, supertypes
 from planners.pddl.robots import static_atoms
-from planners.search.graphs import csgraph
+from planners.system.limits import csgraph
 
 #: No object, or a number that is not defined.
 NONE = -1

@@ -38,12 +38,11 @@ from coordlang.language.sentences import Sentence, sentence
 from coordlang.language.words import Partition
 from coordlang.required.choices import Choices, LabelSets
 from planners.joint.tables import Ints
-from planners.search.graphs import csgraph
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.search.portions import estimate
 from planners.system.errors import OutOfMemory, OutOfTime
-from planners.system.limits import reaching, stop_clock
+from planners.system.limits import csgraph, reaching, stop_clock
 
 #: The weighted set that holds only the empty sequence, once.
 END = 0

@@ -17,8 +17,8 @@ from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Bools, Ints, Rows
 from planners.search.goals import FAR, FactsOf, goal_facts
-from planners.search.graphs import csgraph
 from planners.system.errors import OutOfMemory
+from planners.system.limits import csgraph
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import math
+import os
 import re
 import resource
 import signal
@@ -19,6 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 from planners.system.errors import CoordlangError, OutOfMemory, OutOfTime
 
@@ -49,6 +51,9 @@ _NO_REASON = ("without exception set", "without setting an exception")
 _LONGER = "Use a larger --time-limit."
 #: Of the memory that is free, what a process takes that is given no limit.
 _SHARE = 0.8
+#: Bytes of address space that scipy takes at most, with one thread; and how many threads its BLAS
+#: starts, for the time in which it is loaded.
+_SCIPY, _THREADS = 192 << 20, "OPENBLAS_NUM_THREADS"
 
 
 @contextmanager
@@ -248,6 +253,35 @@ def load_libraries() -> None:
     import numpy as np
 
     np.zeros((8, 8)) @ np.zeros((8, 8))
+
+
+def csgraph() -> Any:
+    """The module ``scipy.sparse.csgraph``.
+
+    Raises `OutOfMemory` if the limit on the address space leaves no room for it: BLAS would ask for
+    memory without end while it is loaded, and hear no signal.
+    """
+    left = address_space_left()
+    if "scipy.sparse.csgraph" in sys.modules or left == math.inf:
+        from scipy.sparse import csgraph
+
+        return csgraph
+    if left < _SCIPY:
+        raise OutOfMemory(
+            f"scipy takes up to {_SCIPY / 2**20:.0f} MiB of address space, and "
+            f"{left / 2**20:.0f} MiB are left",
+            remedy=f"Use {more_memory()}.",
+        )
+    before = os.environ.get(_THREADS)
+    os.environ[_THREADS] = "1"  # graphs need no BLAS, and each thread of it takes memory
+    try:
+        from scipy.sparse import csgraph
+    finally:
+        if before is None:
+            del os.environ[_THREADS]
+        else:
+            os.environ[_THREADS] = before
+    return csgraph
 
 
 def lacks_memory(error: BaseException) -> bool:
