@@ -21,6 +21,7 @@ from coordlang.vocabulary.greedy import (
     Constraint,
     alternatives,
     clashing,
+    first_language,
     greedy_partition,
     separations,
 )
@@ -44,9 +45,6 @@ def separating(job: Job) -> Outcome:
     search = _Search(job)
     with closing(search.problems):
         stopped = run_until_stopped(search.run)
-    if search.best is None:
-        assert stopped is not None
-        raise stopped
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
 
 
@@ -61,7 +59,7 @@ class _Search:
     def __init__(self, job: Job) -> None:
         self._job = job
         self.lower = job.lower_bound
-        self.best: Assignment | None = job.incumbent
+        self.best = job.incumbent or first_language(job)
         #: The constraints that are known, as a set, too, and states that need words of their own.
         self._known: list[Constraint] = []
         self._met: set[Constraint] = set()
@@ -75,7 +73,7 @@ class _Search:
     @property
     def upper(self) -> int:
         """The number of words known to suffice."""
-        return len(self._job.states) + 1 if self.best is None else word_count(self.best)
+        return word_count(self.best)
 
     def run(self) -> None:
         if not self._job.first_differences.requiring:

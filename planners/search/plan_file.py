@@ -140,10 +140,9 @@ def numbered_actions(plans: Plans, plan: Plan, steps: Plan) -> Iterator[tuple[in
         yield from ((number, text) for text in dict.fromkeys(own) if text is not None)
 
 
-def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, Any]:
+def to_json(plans: Plans, listed: Sequence[Plan]) -> dict[str, Any]:
     """The data of a JSON plan file: the listed plans, the exact number of all, the optimal cost."""
     model = plans.space.model.in_step
-    _, second = plans.space.cost_of(task)
     data: dict[str, Any] = {
         "plans": [
             {"cost": len(steps), "actions": [list(step) for step in texts(model, steps)]}
@@ -151,7 +150,7 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
         ],
         "count": json_count(plans.count),
         "complete": len(listed) == plans.count,
-        "optimal_cost": plans.space.least_makespan(task),
+        "optimal_cost": plans.space.least_makespan(0),
         "robots": list(model.robots),
     }
     if model.slack:
@@ -159,7 +158,7 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
     if model.is_asynchronous:
         data["execution"] = "asynchronous"
     if model.cost != "makespan":
-        data["optimal_second_cost"] = second
+        _, data["optimal_second_cost"] = plans.space.cost_of(0)
     return data
 
 

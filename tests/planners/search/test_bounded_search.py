@@ -17,7 +17,7 @@ import pytest
 from planners.loading import PlanningInstance
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search import bounded_search, exact_bound
-from planners.search.heuristics import CHOICES
+from planners.search.heuristics import HEURISTICS
 from planners.search.optimal_plans import search, search_with_effort
 from planners.search.plans import counts
 from planners.search.reachable import Exploration
@@ -118,7 +118,7 @@ def compared(models: Iterable[PlanningInstance | None]) -> Counter[str]:
         if loaded is None:
             continue
         model, task = loaded.model, loaded.tasks[0]
-        searches = [(SIZES[number % len(SIZES)], heuristic) for heuristic in CHOICES]
+        searches = [(SIZES[number % len(SIZES)], heuristic) for heuristic in ("auto", *HEURISTICS)]
         if loaded.domain.name == "rooms":  # made for what the solver is asked
             searches = [(asking, "auto") for asking in ASKING[number % 2 :: 2]]
         try:
