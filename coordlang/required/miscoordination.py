@@ -25,8 +25,6 @@ from planners.system.limits import reaching
 Labels = tuple[int, ...]
 #: A node of a walk: each robot's choices, and where their mixture is.
 _Node = tuple[tuple[int, ...], int]
-#: The mixed labels that lead to a node of the walk, the last ones first.
-_Way = tuple[Labels, "_Way"] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,19 +40,15 @@ def earliest_witness(choices: Choices, start: int) -> Trail:
 
     As many robots as is easily possible follow the same plan.
     """
-    steps: list[Labels] = []
-    way = _first_break(choices, start)
-    while way is not None:
-        mixed, way = way
-        steps.insert(0, mixed)
+    steps = _first_break(choices, start)
     plans = _shared_plans(choices.space, start, steps)
     return Trail(start, [plan[: len(steps)] for plan in plans])
 
 
-def _first_break(choices: Choices, start: int) -> _Way:
+def _first_break(choices: Choices, start: int) -> tuple[Labels, ...]:
     """The fewest steps of a mixture that breaks with the last one, breadth first."""
     begin = tuple(choices.of_node[:, start].tolist())
-    here: dict[_Node, _Way] = {(begin, start): None}
+    here: dict[_Node, tuple[Labels, ...]] = {(begin, start): ()}
     walked = 0
 
     def so_far() -> str:
@@ -62,16 +56,16 @@ def _first_break(choices: Choices, start: int) -> _Way:
 
     with reaching(so_far, choices.space.model.smaller("smaller tasks")):
         while here:
-            below: dict[_Node, _Way] = {}
+            below: dict[_Node, tuple[Labels, ...]] = {}
             for (chosen, y), way in here.items():
                 walked += 1
                 targets = choices.edges_of(y)
                 for mixed, after in choices.steps(chosen):
                     target = targets.get(mixed)
                     if target is None:
-                        return mixed, way
+                        return *way, mixed
                     if (after, target) not in below and choices.fails(after, target):
-                        below[after, target] = mixed, way
+                        below[after, target] = *way, mixed
             here = below
     raise AssertionError("the node requires coordination")
 

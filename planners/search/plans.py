@@ -73,19 +73,40 @@ class Plans:
     def steps(self, plan: Plan) -> Plan:
         """The joint steps of a plan.
 
-        With slack without the rest at the end; without a common step all is done as soon as
-        possible.
+        Without a common step all is done as soon as possible.  With slack the rest at the end is
+        left out: where robots have several ways to do nothing only the first one, so that different
+        plans stay different.
         """
         if self._timing:
             return self._timing.steps(plan, self.states(plan))
-        return self.without_rest(plan)
+        path = self.space.path_with(self.start, plan) if self.space.model.slack else None
+        if path is None:
+            return plan
+        nodes = self.space.nodes_on(self.start, path)
+        length = len(plan)
+        while length and path[length - 1] == self._rest(nodes[length - 1]):
+            length -= 1
+        return plan[:length]
 
     def of_steps(self, steps: Plan) -> Plan | None:
-        """The plan with these joint steps, None if they begin no plan.
+        """The plan with these joint steps, and with slack a rest at the end.
 
-        Without a common step whatever their timing; what is no event of a plan here is -1.
+        None if they begin no plan, or are too many.  Without a common step whatever their timing;
+        what is no event of a plan here is -1.
         """
-        return self._timing.labels(self.start, steps) if self._timing else self.padded(steps)
+        if self._timing:
+            return self._timing.labels(self.start, steps)
+        path = self.space.path_with(self.start, steps)
+        if path is None:
+            return None
+        node = self.space.nodes_on(self.start, path)[-1]
+        while self.space.layer[node] > 0:
+            edge = self._rest(node)
+            if edge is None:
+                return None
+            steps = (*steps, self.space.labels_of(edge))
+            node = self.space.target_of(edge)
+        return steps
 
     def __iter__(self) -> Iterator[Plan]:
         """All plans, lazily: memory is one plan, with the edges beside it."""
@@ -127,38 +148,6 @@ class Plans:
             for node, edge in zip(self.space.nodes_on(self.start, path), path, strict=False)
         ]
         return sum(self.counted[self.space.target_of(e)] for edges in before for e in edges)
-
-    def padded(self, plan: Plan) -> Plan | None:
-        """A plan within slack that is given without its rest at the end, with it.
-
-        None if there is none, or it is too long.
-        """
-        path = self.space.path_with(self.start, plan)
-        if path is None:
-            return None
-        node = self.space.nodes_on(self.start, path)[-1]
-        while self.space.layer[node] > 0:
-            edge = self._rest(node)
-            if edge is None:
-                return None
-            plan = (*plan, self.space.labels_of(edge))
-            node = self.space.target_of(edge)
-        return plan
-
-    def without_rest(self, plan: Plan) -> Plan:
-        """A plan without the rest at its end that `padded` adds.
-
-        Where robots have several ways to do nothing only the first one is left out, so that
-        different plans stay different.
-        """
-        path = self.space.path_with(self.start, plan) if self.space.model.slack else None
-        if path is None:
-            return plan
-        nodes = self.space.nodes_on(self.start, path)
-        length = len(plan)
-        while length and path[length - 1] == self._rest(nodes[length - 1]):
-            length -= 1
-        return plan[:length]
 
     def _rest(self, node: int) -> int | None:
         """The edge from a goal's node in which every robot idles, None if there is none."""

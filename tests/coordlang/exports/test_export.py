@@ -262,7 +262,7 @@ def test_every_plan_within_slack_has_the_sentence(
     assert len(sentences) > 1
     of_task = Plans.of(task_language.space, task_language.task)
     for words, plans in sentences.items():
-        least = {plan: len(plan if sees else of_task.without_rest(plan)) for plan in plans}
+        least = {plan: len(plan if sees else of_task.steps(plan)) for plan in plans}
         wanted = {plan[:n] for plan in plans for n in range(least[plan], len(plan) + 1)}
         for limit in FORMS.values():
             monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", limit)

@@ -76,9 +76,9 @@ def test_random_tasks_have_the_plans_that_the_definition_lists(robots: int, seed
         plans = Plans.of(space)
         assert {texts(found.model, plan) for plan in plans} == naive
         assert len(naive) == plans.count
-        short = {plans.without_rest(plan) for plan in plans}
+        short = {plans.steps(plan) for plan in plans}
         assert len(short) == plans.count
-        assert {plans.padded(plan) for plan in short} == {*plans}
+        assert {plans.of_steps(plan) for plan in short} == {*plans}
         shorter += len({*map(len, short)}) > 1
         nodes = np.column_stack((space.goal, space.state, space.layer))
         assert len(np.unique(nodes, axis=0)) == len(space)
@@ -96,7 +96,7 @@ def test_counts_of_shipped_problems(name: str, makespan: int, counts: tuple[int,
         found = loaded(folder, stem, slack)
         plans = Plans.of(search(found.model, found.tasks[0]))
         assert plans.count == count
-        assert slack == 0 or plans.padded((*plans.unrank(0), (0, 0))) is None
+        assert slack == 0 or plans.of_steps((*plans.unrank(0), (0, 0))) is None
         assert plans.space.least_makespan(0) == makespan
 
 
@@ -161,7 +161,7 @@ def test_a_rest_is_in_the_goal_and_may_be_dear(domain: str, rest: int, lengths: 
     price = {None: rest, "(do r1)": 1, "(do r2)": 1}
     naive = by_definition(found, lambda step: sum(price.get(text, 0) for text in step))
     assert {texts(found.model, plan) for plan in plans} == naive
-    assert sorted(len(plans.without_rest(plan)) for plan in plans) == lengths
+    assert sorted(len(plans.steps(plan)) for plan in plans) == lengths
 
 
 @pytest.mark.parametrize(
