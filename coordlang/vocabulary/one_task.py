@@ -221,7 +221,11 @@ class TwoWords:
         """
         if self._formula is None or (self._is_answered and not self._is_complete):
             self.close()
-            self._formula, self._is_answered = self._next_formula(most), False
+            wanted = max(_FIRST, _MORE * self._known)
+            if wanted > most:
+                raise Undecided
+            self._is_complete, self._known = self._pairs.grow(wanted), self._pairs.looked_at
+            self._formula, self._is_answered = _Changes(self._states, self._pairs), False
         self._formula.require(self._clauses)
         before = self._formula.conflicts
         try:
@@ -230,13 +234,6 @@ class TwoWords:
             self.conflicts += self._formula.conflicts - before
         self._is_answered = True
         return found
-
-    def _next_formula(self, most: int) -> _Changes:
-        wanted = max(_FIRST, _MORE * self._known)
-        if wanted > most:
-            raise Undecided
-        self._is_complete, self._known = self._pairs.grow(wanted), self._pairs.looked_at
-        return _Changes(self._states, self._pairs)
 
     def close(self) -> None:
         """Give back what the solver holds."""

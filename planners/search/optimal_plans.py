@@ -64,13 +64,6 @@ def search(model: JointModel, task: PlanningTask, heuristic: str = "auto") -> Pl
     return search_within(model, task, makespan)
 
 
-def search_within(model: JointModel, task: PlanningTask, makespan: int) -> PlanSpace:
-    """The plans of one task within the model's slack; ``makespan`` is the least one."""
-    space = explore_within(model, task, makespan + model.slack)
-    with reaching(lambda: f"the plans within slack, over {len(space):,} states", "less slack"):
-        return _on_plans(_plan_space(space, [(task.goal, task.init[None, :])]))
-
-
 def _on_plans(graph: PlanSpace) -> PlanSpace:
     """The plan space with a table of just the states that plans pass through."""
     used, state = np.unique(graph.state, return_inverse=True)
@@ -263,14 +256,13 @@ def _shortest_ways(space: Space, distance: Ints, goal: Ints, state: Ints) -> Pla
 # ---- slack
 
 
-def explore_within(model: JointModel, task: PlanningTask, steps: int) -> Space:
-    """The states and joint steps of all plans of a task with at most so many steps, and some more.
+def search_within(model: JointModel, task: PlanningTask, makespan: int) -> PlanSpace:
+    """The plans of one task within the model's slack; ``makespan`` is the least one.
 
-    A state is kept if the steps to it and a lower bound on the steps from it are within ``steps``.
-    Breadth first, so that the steps to it are the least: every state of such a plan is kept.  The
-    joint steps are those between states that are kept.
+    A state is kept if the steps to it and a lower bound on the steps from it are within the bound.
+    Breadth first, so that the steps to it are the least: every state of such a plan is kept.
     """
-    heuristic = search_heuristic("auto", model, task)
+    heuristic, steps = search_heuristic("auto", model, task), makespan + model.slack
     found = Exploration(model, task.init[None, :])
 
     def so_far() -> str:
@@ -287,7 +279,9 @@ def explore_within(model: JointModel, task: PlanningTask, steps: int) -> Space:
                 new = new[found.depth + 1 + bound <= steps]
             found.layers.append(new)
         found.expand()  # goal states that are met in the last layer rest there, as do others
-        return found.space()
+        space = found.space()
+    with reaching(lambda: f"the plans within slack, over {len(space):,} states", "less slack"):
+        return _on_plans(_plan_space(space, [(task.goal, task.init[None, :])]))
 
 
 def rests(labels: Labels) -> Bools:
