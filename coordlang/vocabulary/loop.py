@@ -8,9 +8,11 @@ failing plans left: it is a language.  Work is counted, never timed.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from math import isqrt
 
 from coordlang.language.warping import Clause
@@ -20,7 +22,6 @@ from coordlang.vocabulary.sat import (
     Undecided,
     clique,
     most_constrained_first,
-    most_frequent_pairs,
     without_implied,
 )
 from planners.search.sat import SolverName
@@ -154,7 +155,8 @@ class ProblemsBySize:
 _EASY = 1_000
 #: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
 _COMPARISONS = 1_000_000
-#: Pairs of states by which symmetric partitions are compared: enough to tell most apart.
+#: Pairs of states, in most clauses, by which symmetric partitions are compared: enough to tell
+#: most apart.
 _COMPARED_PAIRS = 100
 
 
@@ -201,6 +203,7 @@ class Partitions(ProblemsBySize):
         for clause in clauses:
             problem.separate_one(clause)
         if size in self._hard:
-            pairs = most_frequent_pairs(self._clauses, _COMPARED_PAIRS)
-            problem.add_lex_leaders(self._permutations, pairs)
+            frequency = Counter(chain.from_iterable(self._clauses))
+            pairs = sorted(frequency, key=lambda pair: (-frequency[pair], pair))
+            problem.add_lex_leaders(self._permutations, pairs[:_COMPARED_PAIRS])
         return problem

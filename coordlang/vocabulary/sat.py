@@ -7,7 +7,7 @@ A clause with fewer pairs asks for more, and implies every clause that holds its
 from __future__ import annotations
 
 import sys
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, product, repeat
 from typing import Any
@@ -40,12 +40,6 @@ def without_implied(clauses: Iterable[Clause], comparisons: int = sys.maxsize) -
         rarest = min(sorted(clause), key=lambda p: len(by_pair.get(p, ())))
         by_pair.setdefault(rarest, []).append(clause)
     return kept
-
-
-def most_frequent_pairs(clauses: Iterable[Clause], number: int) -> list[Pair]:
-    """The pairs that most clauses hold, at most ``number``, the most frequent first."""
-    frequency = Counter(chain.from_iterable(clauses))
-    return sorted(frequency, key=lambda p: (-frequency[p], p))[:number]
 
 
 def most_constrained_first(states: Iterable[int], clauses: Iterable[Clause]) -> list[int]:
