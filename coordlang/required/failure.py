@@ -25,7 +25,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import accumulate
-from math import gcd, prod
+from math import gcd, prod, sqrt
 from random import Random
 from statistics import mean
 from typing import Any, NamedTuple
@@ -42,7 +42,7 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.search.portions import estimate
 from planners.system.errors import OutOfMemory, OutOfTime
-from planners.system.limits import csgraph, reaching, stop_clock
+from planners.system.limits import reaching, stop_clock
 
 #: The weighted set that holds only the empty sequence, once.
 END = 0
@@ -383,16 +383,12 @@ def failures_under(partition: Partition, candidates: Candidates, *, is_claimed: 
 
 
 def wilson(successes: int, runs: int) -> tuple[float, float]:
-    """Return the 95 % confidence interval of a proportion, by Wilson's score (1927).
-
-    Raises `ValueError` without runs, or if there are not between 0 and ``runs`` successes, and
-    `OutOfMemory` where there is no room for scipy.
-    """
-    csgraph()  # it is loaded only where it fits
-    from scipy.stats import binomtest
-
-    low, high = binomtest(successes, runs).proportion_ci(method="wilson")
-    return float(low), float(high)
+    """Return the 95 % confidence interval of a proportion, by Wilson's score (1927)."""
+    share, z = successes / runs, 1.959963984540054  # above which 2.5 % of a normal variable are
+    twice = 2 * (runs + z**2)
+    middle = (2 * runs * share + z**2) / twice
+    half = z / twice * sqrt(4 * runs * share * (1 - share) + z**2)
+    return middle - half if successes else 0.0, middle + half if successes < runs else 1.0
 
 
 def estimated_failure(
