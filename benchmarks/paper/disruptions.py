@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import prod
+from math import inf, prod
 from random import Random
 from statistics import fmean
 
@@ -53,7 +53,7 @@ class SuccessRates:
 
 
 def success_rates(
-    space: PlanSpace, word: Ints, disruptions: Sequence[Disruption], most: int | None = None
+    space: PlanSpace, word: Ints, disruptions: Sequence[Disruption], most: float = inf
 ) -> list[list[SuccessRates]]:
     """Return the success rates of every task (rows) under every disruption (columns).
 

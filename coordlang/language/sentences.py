@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from itertools import groupby
+from itertools import groupby, product
+from math import inf
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from planners.joint.tables import Floats, Ints
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left
 
 #: A sentence as word numbers.
 Sentence = tuple[int, ...]
@@ -76,7 +78,11 @@ def number_of_sentences(space: PlanSpace, word: Ints, start: int) -> int | None:
 
     Beginnings that lead to the same nodes are counted together: a deterministic automaton.
     """
-    words, entered = [*word.tolist(), _END], _entered(space, word)  # the last one is that of `_END`
+    words = [*word.tolist(), _END]  # the last one is that of `_END`
+    try:
+        entered = _entered(space, word, _ADDITIONS)
+    except OutOfMemory:
+        return None
     beginnings: dict[tuple[int, ...], int] = {(-start,): 1}
     queue, steps = [*beginnings], 0
     while steps < _ADDITIONS:
@@ -96,17 +102,21 @@ def number_of_sentences(space: PlanSpace, word: Ints, start: int) -> int | None:
     return None
 
 
-def _entered(space: PlanSpace, word: Ints) -> list[Counter[int]]:
+def _entered(space: PlanSpace, word: Ints, most: float) -> list[Counter[int]]:
     """For each node those with which plans from it enter their next word, and in how many ways.
 
-    `_END` stands for the end of the plan.
+    `_END` stands for the end of the plan.  Raises `OutOfMemory` beyond ``most`` additions.
     """
     words: list[int] = word.tolist()
     entered: list[Counter[int]] = []
     for node, layer in enumerate(space.layer.tolist()):
         entered.append(Counter(() if layer else (_END,)))
         for target in space.successors(node):
-            entered[node].update(entered[target] if words[target] == words[node] else (target,))
+            after = entered[target] if words[target] == words[node] else (target,)
+            most -= len(after)
+            entered[node].update(after)
+        if most < 0:
+            raise _too_many()
     return entered
 
 
@@ -115,7 +125,7 @@ def sentence_counts(
     word: Ints,
     *,
     start: int | None = None,
-    most_steps: int | None = None,
+    most_steps: float = inf,
 ) -> dict[int, Counter[Sentence]]:
     """Count the plans with each sentence, from a node of a plan space (default: all its starts).
 
@@ -124,7 +134,7 @@ def sentence_counts(
     first, with the exact numbers of these plans.  O(edges * sentences of a node), at most
     ``most_steps`` additions: raises `OutOfMemory` if it takes more.
     """
-    entered, steps = _entered(space, word), 0
+    entered, steps = _entered(space, word, most_steps), 0
     nodes = set(space.starts.tolist() if start is None else [start])
     for node in reversed(range(len(space))):
         if node in nodes:
@@ -136,7 +146,7 @@ def sentence_counts(
             steps += len(counted[target])
             for rest, number in counted[target].items():
                 counted[node][own, *rest] += ways * number
-        if most_steps is not None and steps > most_steps:
+        if steps > most_steps:
             raise _too_many()
     return counted
 
@@ -160,6 +170,8 @@ def _choices(plans: PlanSpace) -> tuple[tuple[tuple[str | None, ...], ...], ...]
 # ---- how much a language leaves open, and how much it need not say
 
 
+#: Additions to measure without a list of sentences, at most, and the bytes that each takes.
+_MOST_COUNTED, _COUNTED = 20_000_000, 200
 #: More plans than this are not told apart by the measures: it is near the largest float.
 MANY = 10**300
 
@@ -183,7 +195,8 @@ class Flexibility:
     task with more than `MANY` counts as one with so many.
 
     ``words[k]`` holds the word number of each node of ``spaces[k]``.  No sentence is listed: the
-    sum of the squares is the number of pairs of plans that have one sentence.
+    sum of the squares is the number of pairs of plans that have one sentence.  Raises `OutOfMemory`
+    where that takes too many additions.
     """
 
     def __init__(self, spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> None:
@@ -205,12 +218,13 @@ class Flexibility:
 
 def _tasks(space: PlanSpace, word: Ints) -> Iterator[tuple[float, ...]]:
     """The measures of each task, in the order of the fields of `Flexibility`."""
-    entered, counted = _entered(space, word), counts(space)
+    most_steps = min(_MOST_COUNTED, memory_left() // _COUNTED)
+    entered, counted = _entered(space, word, most_steps), counts(space)
     #: The words of the sentences of all plans from each node.
     said: list[int] = []
     for plans, after in zip(counted, entered, strict=True):
         said.append(plans + sum(n * said[node] for node, n in after.items() if node != _END))
-    alike = _pairs_alike(space.starts.tolist(), [*word.tolist(), _END], entered)
+    alike = _pairs_alike(space.starts.tolist(), [*word.tolist(), _END], entered, most_steps)
     for start in space.starts.tolist():
         plans = counted[start]
         most = float(min(plans, MANY))
@@ -239,33 +253,47 @@ def _plans_with(words: Sentence, start: int, word: Ints, entered: Sequence[Count
 
 
 def _pairs_alike(
-    starts: Iterable[int], words: Sequence[int], entered: Sequence[Counter[int]]
+    starts: Iterable[int], words: Sequence[int], entered: Sequence[Counter[int]], most: float
 ) -> dict[tuple[int, int], int]:
     """How many pairs of plans, one from each of two nodes, have one sentence.
 
-    For all pairs of nodes that such plans from one of the starts may enter a word with.
+    For all pairs of nodes that such plans from one of the starts may enter a word with.  Raises
+    `OutOfMemory` beyond ``most`` additions.
     """
-    by_word: list[dict[int, list[tuple[int, int]]]] = []
-    for after in entered:
-        by_word.append(defaultdict(list))
-        for node, ways in after.items():
-            by_word[-1][words[node]].append((node, ways))
+    by_word = [_by_word(after, words) for after in entered]
     number = {(_END, _END): 1}
     open_pairs = [(start, start) for start in starts]
     while open_pairs:
-        one, other = pair = open_pairs[-1]
+        pair, before, total = open_pairs[-1], len(open_pairs), 0
         if pair in number:
             open_pairs.pop()
             continue
-        before, total = len(open_pairs), 0
-        for word in by_word[one].keys() & by_word[other].keys():
-            for target, ways in by_word[one][word]:
-                for target2, ways2 in by_word[other][word]:
-                    there = (target, target2) if target < target2 else (target2, target)
-                    if there in number:
-                        total += ways * ways2 * number[there]
-                    else:
-                        open_pairs.append(there)
+        for there, ways in _following(*map(by_word.__getitem__, pair)):
+            most -= 1
+            if there in number:
+                total += ways * number[there]
+            else:
+                open_pairs.append(there)
+        if most < 0:
+            raise _too_many()
         if len(open_pairs) == before:
             number[pair] = total
     return number
+
+
+#: The nodes with which plans may enter each word next, and in how many ways.
+_Next = Mapping[int, Sequence[tuple[int, int]]]
+
+
+def _by_word(entered: Mapping[int, int], words: Sequence[int]) -> _Next:
+    found: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for node, ways in entered.items():
+        found[words[node]].append((node, ways))
+    return found
+
+
+def _following(one: _Next, other: _Next) -> Iterator[tuple[tuple[int, int], int]]:
+    """The pairs with which two plans may enter the same word next, and in how many ways."""
+    for word in one.keys() & other.keys():
+        for (node, ways), (beside, more) in product(one[word], other[word]):
+            yield (node, beside) if node < beside else (beside, node), ways * more

@@ -39,7 +39,7 @@ def flexible(job: Job, found: Outcome, work: int = WORK) -> Outcome:
     The bound on the number of words is that of ``found``.  ``figures`` also hold ``flexibility``
     (plans left open, averaged over tasks), ``flexibility_before`` (that of ``found``),
     ``flexibility_bound`` (which no language exceeds) and ``communication_saving``; nothing of these
-    where it was ended before they were measured.
+    where they are too much work to measure, or it was ended before.
     """
     search = _Search(job, found)
     stopped = run_until_stopped(lambda: search.run(work))
