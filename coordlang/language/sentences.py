@@ -74,7 +74,7 @@ def task_sentences(
 
 
 def number_of_sentences(space: PlanSpace, word: Ints, start: int) -> int | None:
-    """How many sentences the plans from a node have, by the word of each node; None: too many.
+    """How many sentences the plans from a node have, by the word of each node; None: too much work.
 
     Beginnings that lead to the same nodes are counted together: a deterministic automaton.
     """
