@@ -38,6 +38,7 @@ from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import plan_space
+from planners.search.plan_file import json_count
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.system.errors import OutOfMemory, ProvedImpossible, UsageError
@@ -222,6 +223,7 @@ def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
     language, space = shown.language, shown.language.space
     part = drawn_part(language, seed)
     leading = leading_sentences(language, SENTENCES)
+    number = number_of_sentences(space, language.word, language.start)
     verdict = _verdict(language)
     violation = verdict.witness if verdict else None  # plans of one sentence that miscoordinate
     makespan, second = space.cost_of(language.task)
@@ -244,7 +246,7 @@ def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
             {"words": list(words), "plans": str(plans), "own": _own_counts(language, words)}
             for words, plans in leading
         ],
-        "all_sentences": number_of_sentences(space, language.word, language.start),
+        "all_sentences": number if number is None else json_count(number),
         "witness": _witness_data(language, shown.witness, tables),
         "violation": _witness_data(language, violation, tables),
     }
