@@ -80,7 +80,7 @@ def number_of_sentences(space: PlanSpace, word: Ints, start: int) -> int | None:
     """
     words = [*word.tolist(), _END]  # the last one is that of `_END`
     try:
-        entered = _entered(space, word, _ADDITIONS)
+        entered = _entered(space, words, _ADDITIONS)
     except OutOfMemory:
         return None
     beginnings: dict[tuple[int, ...], int] = {(-start,): 1}
@@ -102,12 +102,11 @@ def number_of_sentences(space: PlanSpace, word: Ints, start: int) -> int | None:
     return None
 
 
-def _entered(space: PlanSpace, word: Ints, most: float) -> list[Counter[int]]:
+def _entered(space: PlanSpace, words: Sequence[int], most: float) -> list[Counter[int]]:
     """For each node those with which plans from it enter their next word, and in how many ways.
 
     `_END` stands for the end of the plan.  Raises `OutOfMemory` beyond ``most`` additions.
     """
-    words: list[int] = word.tolist()
     entered: list[Counter[int]] = []
     for node, layer in enumerate(space.layer.tolist()):
         entered.append(Counter(() if layer else (_END,)))
@@ -134,14 +133,15 @@ def sentence_counts(
     first, with the exact numbers of these plans.  O(edges * sentences of a node), at most
     ``most_steps`` additions: raises `OutOfMemory` if it takes more.
     """
-    entered, steps = _entered(space, word, most_steps), 0
+    words: list[int] = word.tolist()
+    entered, steps = _entered(space, words, most_steps), 0
     nodes = set(space.starts.tolist() if start is None else [start])
     for node in reversed(range(len(space))):
         if node in nodes:
             nodes.update(entered[node])
     counted = {_END: Counter[Sentence]({(): 1})}
     for node in sorted(nodes - {_END}):
-        counted[node], own = Counter(), int(word[node])
+        counted[node], own = Counter(), words[node]
         for target, ways in entered[node].items():
             steps += len(counted[target])
             for rest, number in counted[target].items():
@@ -219,34 +219,37 @@ class Flexibility:
 def _tasks(space: PlanSpace, word: Ints) -> Iterator[tuple[float, ...]]:
     """The measures of each task, in the order of the fields of `Flexibility`."""
     most_steps = min(_MOST_COUNTED, memory_left() // _COUNTED)
-    entered, counted = _entered(space, word, most_steps), counts(space)
+    words = [*word.tolist(), _END]  # the last one is that of `_END`
+    entered, counted = _entered(space, words, most_steps), counts(space)
     #: The words of the sentences of all plans from each node.
     said: list[int] = []
     for plans, after in zip(counted, entered, strict=True):
         said.append(plans + sum(n * said[node] for node, n in after.items() if node != _END))
-    alike = _pairs_alike(space.starts.tolist(), [*word.tolist(), _END], entered, most_steps)
+    alike = _pairs_alike(space.starts.tolist(), words, entered, most_steps)
     for start in space.starts.tolist():
         plans = counted[start]
         most = float(min(plans, MANY))
-        first = sentence(word[space.nodes_on(start, space.first_path(start))].tolist())
+        first = sentence(words[node] for node in space.nodes_on(start, space.first_path(start)))
         yield (
             plans,
             most * (alike[start, start] / plans**2),
-            most * (_plans_with(first, start, word, entered) / plans),
+            most * (_plans_with(first, start, words, entered) / plans),
             said[start] / plans,
             float(len(first)),
             int(space.layer[start]),
         )
 
 
-def _plans_with(words: Sentence, start: int, word: Ints, entered: Sequence[Counter[int]]) -> int:
+def _plans_with(
+    said: Sentence, start: int, words: Sequence[int], entered: Sequence[Counter[int]]
+) -> int:
     """How many plans from a node have a sentence, which begins with the word of the node."""
     begun = Counter({start: 1})
-    for own in words[1:]:
+    for word in said[1:]:
         after = Counter[int]()
         for node, number in begun.items():
             for target, ways in entered[node].items():
-                if target != _END and word[target] == own:
+                if words[target] == word:
                     after[target] += number * ways
         begun = after
     return sum(number * entered[node][_END] for node, number in begun.items())

@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from planners.grounding.actions import GroundAction
-from planners.joint.model import JointModel
+from planners.joint.model import JointModel, spelled
 from planners.pddl.model_options import Execution
 from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.errors import BadInput, Position, Refuted
@@ -252,7 +252,7 @@ def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
                 f"expected '0: (action args)', found {echoed(raw.strip())}",
                 "`coordlang plans DOMAIN PROBLEM` writes plans in this form.",
             )
-        action = "(" + " ".join(match["action"][1:-1].split()) + ")"
+        action = spelled(match["action"])
         step = int(match["step"][-8:]) if match["step"] else max(steps, default=-1) + 1
         if match["step"] and (len(match["step"]) > 8 or step > _MOST_STEPS):
             raise Position(name, number, 1).fail(
