@@ -97,6 +97,7 @@ def test_a_delay_by_hand() -> None:
 # ---- what each word buys
 
 
+@pytest.mark.thorough
 def test_the_curve_of_the_smallest_grid() -> None:
     found = silence.curve(WORLDS["GW1"], seed=0)
     points = found["points"]

@@ -156,6 +156,7 @@ def test_table_1_has_the_papers_tasks_and_states() -> None:
 # ---- the recipes
 
 
+@pytest.mark.thorough
 def test_a_sentence_may_succeed_of_which_no_plan_does() -> None:
     """What the robots choose is an optimal plan, but may have another sentence."""
     world, rows, columns = WAREHOUSES["open 3x3"]
@@ -235,6 +236,7 @@ def test_rows_are_measured_once_and_a_line_that_was_cut_off_again(tmp_path: Path
     assert KeptRows(path).rows == kept.rows
 
 
+@pytest.mark.thorough
 def test_processes_end_at_their_limits() -> None:
     done = run_python(("-c", "print('{\"n\": 1}')"))
     assert (done.data, done.code) == ({"n": 1}, 0)

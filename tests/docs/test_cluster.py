@@ -71,6 +71,7 @@ def test_one_machine_and_two_terminals(folder: Path) -> None:
 
 
 @needs_distributed
+@pytest.mark.thorough
 def test_the_cluster_of_the_page_has_two_workers_and_listens_on_this_machine_only(
     folder: Path,
 ) -> None:

@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -24,18 +25,21 @@ from tests.support.command import Command, program
 from tests.support.domains import ROOT, T_MAP, all_tasks, files_of
 from tests.support.pages import DOCS, PAGES, blocks, commands, matches, run_command, run_python
 
-#: Pages of many commands, which take a while.
-LONG = ("asynchronous", "cli", "gallery", "library", "lifted", "simulation", "sites")
+#: Pages of many commands, and scripts, which take a while.
+LONG = {
+    *("asynchronous", "cli", "gallery", "library", "lifted", "simulation", "sites"),
+    *("unified-planning", "use", "words", "five-domains", "benchmark_tasks"),
+}
 
 
-@pytest.mark.parametrize(
-    "page",
-    [
-        pytest.param(p, id=p.stem, marks=[pytest.mark.thorough] if p.stem in LONG else [])
-        for p in PAGES
-        if blocks(p)
-    ],
-)
+def by_name(paths: Iterable[Path]) -> list[Any]:
+    """Those that are long are for thorough tests."""
+    return [
+        pytest.param(p, id=p.stem, marks=[pytest.mark.thorough] * (p.stem in LONG)) for p in paths
+    ]
+
+
+@pytest.mark.parametrize("page", by_name(filter(blocks, PAGES)))
 def test_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "domains").symlink_to(ROOT / "domains")
     monkeypatch.chdir(tmp_path)
@@ -79,9 +83,7 @@ def cells_of(path: Path) -> list[str]:
     return ["".join(cell["source"]) + "\n" for cell in cells]
 
 
-@pytest.mark.parametrize(
-    "path", sorted(e for e in EXAMPLES if e.stem not in DEEPER), ids=lambda path: path.stem
-)
+@pytest.mark.parametrize("path", by_name(p for p in sorted(EXAMPLES) if p.stem not in DEEPER))
 def test_example(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "domains").symlink_to(ROOT / "domains")
     monkeypatch.chdir(tmp_path)

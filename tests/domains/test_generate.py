@@ -27,6 +27,7 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.search.reachable import Space, explore
 from planners.system.errors import BadInput
+from tests.support import thorough
 from tests.support.domains import DOMAINS, MAPS, read, world_of
 from tests.support.texts import model_of
 
@@ -185,7 +186,7 @@ def to_every_state(space: Space) -> PlanSpace:
 
 
 @pytest.mark.parametrize(
-    "problem", ["gw1-2x2", "gw2-2x3", "gw4-3x3", "gwb1-2x4", "gwb5-3x3", "corners-4x4"]
+    "problem", ["gw1-2x2", "gw2-2x3", "gw4-3x3", "gwb1-2x4", "gwb5-3x3", *thorough("corners-4x4")]
 )
 def test_both_styles_are_the_same_model(problem: str) -> None:
     one, other = (world_of(style, problem).space for style in ("grid", "grid-joint"))

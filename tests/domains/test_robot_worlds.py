@@ -23,6 +23,7 @@ from planners.pddl import read_domain
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
+from tests.support import thorough
 from tests.support.domains import DOMAINS, MAPS, loaded_from, world_of
 from tests.support.pages import Row, blocks, candidates, commands, run_command, table
 
@@ -39,6 +40,7 @@ WORLDS = {
     "flags": ":agent of type robot",
 }
 
+READ = sorted({*WORLDS, "corridor"} - {"two-arms", "lock"})
 #: Columns of numbers of plans, under another cost.
 COSTS: dict[Cost, str] = {
     "makespan+actions": "with fewest actions",
@@ -110,7 +112,7 @@ def test_the_table_of_languages(folder: str, row: Row) -> None:
         assert verify(built.language.partition(tasks.model), tasks.spaces).holds
 
 
-@pytest.mark.parametrize("folder", [*WORLDS, "corridor"])
+@pytest.mark.parametrize("folder", ["two-arms", "lock", *thorough(*READ)])
 def test_the_commands_in_the_readme(
     folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -20,6 +20,7 @@ from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, OutOfMemory, Refuted
 from planners.system.files import read_bytes
 from planners.system.limits import time_limit
+from tests.support import thorough
 from tests.support.forks import fork_command
 from tests.support.task_languages import built_for
 
@@ -185,7 +186,7 @@ LARGE = {
 }
 
 
-@pytest.mark.parametrize("name", LARGE)
+@pytest.mark.parametrize("name", ["instances", "join", *thorough("effects", "conditions")])
 def test_six_parameters_and_two_hundred_objects(name: str, tmp_path: Path) -> None:
     text, (code, said) = LARGE[name]
     number = 80 if name == "join" else 200

@@ -26,6 +26,7 @@ import coordlang
 from coordlang.verification.certificate_file import write_certificate
 from planners.system.errors import UsageError
 from planners.system.writing import copy_folders
+from tests.support import slow, thorough
 from tests.support.domains import DOMAINS, files_of
 from tests.support.forks import Fork, fork, fork_command
 
@@ -46,8 +47,8 @@ WRITING = {
     "report": ("report LANGUAGE PDDL -o page.html", "page.html"),
     "check": ("check PDDL", ""),
 }
-QUICK = ("certificate", "tasks", "export")
-SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in WRITING if name not in QUICK]
+QUICK = ("tasks", "export", "certificate")
+SLOW = slow(*(name for name in WRITING if name not in QUICK))
 Fault = Callable[[], object]
 
 
@@ -183,7 +184,7 @@ def ends(
         yield ended.code
 
 
-@pytest.mark.parametrize("name", [*QUICK, *SLOW])
+@pytest.mark.parametrize("name", [*QUICK[:2], *thorough(QUICK[2]), *SLOW])
 def test_the_disk_is_full_at_every_change(
     name: str, said: dict[str, list[str]], tmp_path: Path
 ) -> None:
@@ -196,7 +197,7 @@ def test_the_disk_is_full_at_every_change(
     assert 3 <= met < 999
 
 
-@pytest.mark.parametrize("name", QUICK[:2])
+@pytest.mark.parametrize("name", [QUICK[0], *thorough(QUICK[2])])
 def test_an_output_is_whole_or_none_at_every_length(
     name: str, said: dict[str, list[str]], tmp_path: Path
 ) -> None:
@@ -258,12 +259,10 @@ LEFT = re.compile(r"[a-z0-9_]{8}|\.[^/]{1,16}\.[a-z0-9_]{8}|coordlang-[a-z0-9_]{
 
 
 #: They write as others do.
-ALIKE = ("ground", "understand", "choices", "inspect", "report")
+ALIKE = ("ground", "understand", "choices", "inspect", "report", "check", "export", "verify")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.thorough] if n in ALIKE else []) for n in WRITING]
-)
+@pytest.mark.parametrize("name", [*sorted({*WRITING} - {*ALIKE}), *thorough(*ALIKE)])
 def test_kills(name: str, tmp_path: Path, said: dict[str, list[str]]) -> None:
     """A signal at a random moment, or when something in the folder changes."""
     stage, choice = Stage(name, tmp_path, said), random.Random(name)

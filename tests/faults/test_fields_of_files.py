@@ -20,13 +20,13 @@ from coordlang.verification.certificate_file import write_certificate
 from planners.pddl.model_options import ModelOptions
 from planners.search.plan_space import PlanSpace
 from tests.fuzz.mutations import places
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.command import Command, Outcome
 from tests.support.domains import files_of, read
 
 CELLS = "three-cells"
 #: Every seventh edit always, all of them at night.
-SOME = pytest.mark.parametrize("every", [7, pytest.param(1, marks=pytest.mark.thorough)])
+SOME = pytest.mark.parametrize("every", [23, *thorough(1)])
 #: How a language is made: the options of `build`.
 LANGUAGES = {
     "all pairs": "--tasks all --method greedy",

@@ -169,6 +169,7 @@ DOMAIN = f"""(define (domain road) (:requirements :typing :multi-agent) (:types 
   {" ".join(WALK % n for n in range(16))})"""
 
 
+@pytest.mark.thorough
 def test_a_count_of_many_digits(tmp_path: Path) -> None:
     """Each of 550 steps of a road is walked in 16 ways; the interpreter writes 640 digits."""
     roads = " ".join(f"(next p{n} p{n + 1})" for n in range(550))

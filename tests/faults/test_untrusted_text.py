@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 from planners.system.errors import BadInput, Position
 from planners.system.messages import UNSEEN, echoed, sentence, visible
 from tests.fuzz.mutations import renamed
+from tests.support import thorough
 from tests.support.classical_models import CORRIDOR, CORRIDOR_TASK
 from tests.support.command import Command, Outcome
 
@@ -32,7 +33,7 @@ BAD = (
 )
 #: Texts that stand for these, and one that is only long.
 SOME_BAD = pytest.mark.parametrize(
-    "bad", ["\x1b[31m", "\x9b", "\u202e", "x" * 20_000], ids=lambda b: ascii(b[:6])
+    "bad", ["\x1b[31m", "x" * 20_000, *thorough("\x9b", "\u202e")], ids=lambda b: ascii(b[:6])
 )
 OWN = ["corridor", "swap", "robot", "place", "at", "next", "move", "r1", "r2", "a", "b", "c", "d"]
 #: Names that other languages may take for something of their own; names that are words of PDDL, of
@@ -177,7 +178,7 @@ report LIFTED PDDL -o -
 """
 
 
-@pytest.mark.parametrize("kind", ["markup", pytest.param("words", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("kind", ["markup", *thorough("words")])
 def test_names_are_quoted_wherever_they_are_written(bare: Make, kind: str, tmp_path: Path) -> None:
     world = bare(NAMES[kind]).written()
     world.words["R1"] = [world.names["r1"]]
@@ -223,7 +224,7 @@ def fast_downward(folder: Path) -> None:
     assert len((folder / "sas_plan").read_text().splitlines()) > 2
 
 
-@pytest.mark.parametrize("kind", ["markup", "words"])
+@pytest.mark.parametrize("kind", ["markup", *thorough("words")])
 def test_exported_names_are_read_by_fast_downward(
     bare: Make, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,6 +28,7 @@ from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.system.limits import time_limit
+from tests.support import slow
 from tests.support.domains import SHARED
 from tests.support.pages import DOCS, rows, sections
 
@@ -236,9 +237,7 @@ def varied(name: str, cost: str) -> Candidates:
     return from_listed(instance.domain, instance.problems, tasks, instance.options)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n in QUICK else [pytest.mark.slow]) for n in LANGUAGES]
-)
+@pytest.mark.parametrize("name", [*QUICK, *slow(*sorted({*LANGUAGES} - {*QUICK}))])
 def test_a_language_for_varied_tasks(name: str) -> None:
     tasks, requiring, greedy, words, said = PAGE[name.partition("-")[0]]
     candidates = varied(name, "makespan+actions")

@@ -19,6 +19,7 @@ from planners.search import reachable
 from planners.search.questions import FixedPlans
 from planners.search.reachable import StateTable
 from planners.search.sat import sat_solver, simplified
+from tests.support import thorough
 from tests.support.command import own_process
 from tests.support.domains import DOMAINS
 
@@ -55,7 +56,7 @@ def test_a_command_under_a_limit_that_is_too_small_ends(name: str, code: int, sa
 part = st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), max_size=12)
 
 
-@pytest.mark.parametrize("multiplier", [0, reachable._MULTIPLIER])
+@pytest.mark.parametrize("multiplier", [*thorough(0), reachable._MULTIPLIER])
 @pytest.mark.parametrize("block", [3, 1 << 16])
 @given(parts=st.lists(part, max_size=6))
 def test_states_have_the_numbers_that_a_dictionary_gives(

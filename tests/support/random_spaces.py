@@ -11,7 +11,6 @@ from typing import Any, get_args
 from unittest.mock import Mock
 
 import numpy as np
-import pytest
 
 from coordlang.language.candidates import Candidates, all_pairs, explored_if_small, from_problems
 from coordlang.verification.by_definition import inseparable
@@ -23,6 +22,7 @@ from planners.search.optimal_plans import plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import Space, explore
 from planners.system.errors import BadInput, ProvedImpossible
+from tests.support import slow, thorough
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
 from tests.support.texts import parsed
@@ -116,13 +116,12 @@ def separable_spaces(seeds: range, robots: int | None) -> Iterator[PlanSpace]:
 
 def runs(two: int, three: int, any_kind: int) -> list[Any]:
     """Pairs (robots, seeds): so many models always, and many with ``-m slow``."""
-    many = {2: range(1_000, 1_700), 3: range(2_000, 2_800), 4: range(3_000, 3_300)}
-    slow = (*many.items(), (None, range(4_000, 4_400)))
     return [
         (2, range(two)),
         (3, range(three)),
-        (None, range(any_kind)),
-        *(pytest.param(*entry, marks=pytest.mark.slow) for entry in slow),
+        *thorough((None, range(any_kind))),
+        *slow((2, range(1_000, 1_700)), (3, range(2_000, 2_800)), (4, range(3_000, 3_300))),
+        *slow((None, range(4_000, 4_400))),
     ]
 
 

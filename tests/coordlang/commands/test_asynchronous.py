@@ -159,6 +159,7 @@ def test_choices_are_events(made: Path, shell: Shell) -> None:
     assert "AwaitStep" not in trees
 
 
+@pytest.mark.thorough
 def test_words_over_features_carry_over(shell: Shell) -> None:
     shell("lift SQUARE --tasks all --asynchronous -o lifted.json", 0, "verified by definition on")
     assert json.loads(Path("lifted.json").read_text())["model"]["execution"] == "asynchronous"

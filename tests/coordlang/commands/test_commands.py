@@ -106,6 +106,7 @@ def test_inseparable_plans(shell: Shell) -> None:
     shell("verify l.json LOCK")
 
 
+@pytest.mark.thorough
 def test_same_input_same_bytes(shell: Shell) -> None:
     """Whatever the order of sets of strings: that of this process, and of one with another seed."""
     lines = (
@@ -147,6 +148,7 @@ def test_help_is_light() -> None:
     assert (done.stderr, done.stdout.count("Usage: coordlang")) == ("[]\n", 1 + len(COMMANDS))
 
 
+@pytest.mark.thorough
 def test_helps_begin_with_what_is_used_most_and_their_examples_run(
     coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

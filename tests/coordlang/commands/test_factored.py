@@ -16,6 +16,7 @@ import pytest
 import coordlang as door
 from coordlang.commands.main import COMMANDS
 from tests.coordlang.commands.conftest import Shell
+from tests.support import thorough
 from tests.support.domains import SHARED
 from tests.support.hall import factored
 
@@ -44,10 +45,10 @@ def written(name: str, folder: Path, *, unfactored: bool = False) -> Path:
 @pytest.mark.parametrize(
     "name",
     [
-        *UNIFIED[1:],
-        pytest.param(UNIFIED[0], marks=pytest.mark.thorough),
         "hall",
-        pytest.param("driverlog", marks=pytest.mark.foreign),
+        UNIFIED[1],
+        *thorough(*UNIFIED[::2]),
+        pytest.param("driverlog", marks=[pytest.mark.foreign, pytest.mark.thorough]),
     ],
 )
 def test_the_union_is_the_same_model(name: str, shell: Shell, tmp_path: Path) -> None:

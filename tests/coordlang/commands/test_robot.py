@@ -56,6 +56,7 @@ def team_of(language: Path, loaded: PlanningInstance, **wishes: str) -> dict[str
     }
 
 
+@pytest.mark.thorough
 def test_forked_robots_arrive_and_one_of_them_is_killed(
     language: Path, loaded: PlanningInstance, folder: Path
 ) -> None:

@@ -75,6 +75,7 @@ def test_usage(line: str, message: str, shell: Shell) -> None:
     shell(f"simulate {line}", 2, message)
 
 
+@pytest.mark.thorough
 def test_a_time_limit_keeps_the_runs_that_are_done(simulate: Shell) -> None:
     simulate("")  # everything is loaded
     outcome = simulate("--runs 1000 --time-limit 1 --json", 3, "of 1000 done")

@@ -13,6 +13,7 @@ import pytest
 import coordlang as library
 from planners.system.errors import UsageError
 from tests.coordlang.commands.conftest import FILES, Shell
+from tests.support import thorough
 
 CELLS, SQUARE = FILES["CELLS"], FILES["SQUARE"]
 KEPT = "within 1 step of the optimum"
@@ -20,7 +21,7 @@ KEPT = "within 1 step of the optimum"
 
 @pytest.fixture(
     scope="module",
-    params=[True, pytest.param(False, marks=pytest.mark.thorough)],
+    params=[True, *thorough(False)],
     ids=["seen", "hidden"],
 )
 def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -13,6 +13,7 @@ import pytest
 
 from coordlang.execution.choices import SentenceChoices, to_bytes
 from coordlang.execution.monitor import EventMonitor, MonitorError, NotAllowed, NotPossible
+from tests.support import thorough
 from tests.support.asynchronous import World, texts
 from tests.support.events import (
     EITHER_WAY,
@@ -24,9 +25,7 @@ from tests.support.events import (
     turning_round,
 )
 
-RUNS = [(2, range(24)), (3, range(7))]
-THOROUGH = [(2, range(24, 900)), (3, range(7, 500)), (4, range(60))]
-SEEDS = [*RUNS, *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)]
+SEEDS = [(3, range(7)), *thorough((2, range(900)), (3, range(7, 500)), (4, range(60)))]
 
 
 def monitors_of(found: SentenceChoices) -> list[EventMonitor]:

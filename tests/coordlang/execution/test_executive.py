@@ -34,6 +34,7 @@ from coordlang.execution.fleet_log import (
 )
 from coordlang.execution.monitor import EventMonitor
 from planners.system.errors import Refuted
+from tests.support import thorough
 from tests.support.asynchronous import World, texts
 from tests.support.events import (
     EITHER_WAY,
@@ -206,9 +207,7 @@ class Fleet:
         return tuple(self.logs[name] for name in self.names)
 
 
-RUNS = [(2, range(26)), (3, range(14))]
-THOROUGH = [(2, range(26, 400)), (3, range(14, 200)), (4, range(40))]
-SEEDS = [*RUNS, *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)]
+SEEDS = [(3, range(14)), *thorough((2, range(400)), (3, range(14, 200)), (4, range(40)))]
 
 
 @pytest.mark.parametrize(("robots", "seeds"), SEEDS)

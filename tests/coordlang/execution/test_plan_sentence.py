@@ -28,6 +28,7 @@ from planners.search.plan_file import NotAPlan
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.errors import ProvedImpossible
+from tests.support import thorough
 from tests.support.domains import all_tasks
 from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import EACH_FOLDER, RANDOM, random_task_languages, shipped
@@ -126,7 +127,7 @@ def judged(
     return "longer" if worse.value.excess[0] else "dearer"
 
 
-@pytest.mark.parametrize("number", [12, pytest.param(60, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("number", [7, *thorough(60)])
 def test_wrong_plans_of_random_models(number: int) -> None:
     seen: Counter[str] = Counter()
     models = *random_task_languages(2, number), *random_task_languages(3, number)

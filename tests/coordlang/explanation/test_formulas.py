@@ -28,6 +28,7 @@ from planners.pddl.lifted import Atom
 from planners.pddl.model_options import ModelOptions
 from planners.search.reachable import explore
 from planners.system.errors import OutOfTime
+from tests.support import thorough
 from tests.support.candidates import (
     failing,
     is_language,
@@ -357,9 +358,7 @@ def by_trying_all(number: int) -> tuple[Lengths, list[int], dict[int, Lengths]]:
     return min(length(word, states, shortest) for word in languages), states, shortest
 
 
-@pytest.mark.parametrize(
-    "number", [3, *(pytest.param(n, marks=pytest.mark.thorough) for n in range(10))]
-)
+@pytest.mark.parametrize("number", [3, *thorough(*range(10))])
 def test_shortest_by_trying_all(number: int) -> None:
     candidates = small_worlds(6, number + 1)[number]
     best, states, shortest = by_trying_all(number)

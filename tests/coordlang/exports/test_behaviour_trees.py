@@ -27,7 +27,7 @@ from coordlang.language.words import Partition
 from planners.joint.model import IDLE, JointModel
 from planners.search.plans import Plan
 from planners.system.errors import UsageError
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.asynchronous import Event, World, random_plans, texts
 from tests.support.domains import files_of
 from tests.support.naive_choices import listed
@@ -295,7 +295,9 @@ class FreeTeam:
         ]
 
 
-@pytest.mark.parametrize(("robots", "seeds"), [(2, range(40)), (3, range(8))])
+@pytest.mark.parametrize(
+    ("robots", "seeds"), [(2, range(20)), (3, range(8)), *thorough((2, range(20, 80)))]
+)
 def test_trees_without_a_common_step_do_every_mixture(robots: int, seeds: range) -> None:
     several = 0
     for world, space, plans, made, random in random_plans(robots, seeds, 30):

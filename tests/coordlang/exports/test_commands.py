@@ -19,6 +19,7 @@ from coordlang.exports.pddl import ExportedTask
 from planners.classical.fast_downward import total_cost
 from planners.classical.task import action_names
 from planners.system.errors import UsageError
+from tests.support import slow
 from tests.support.command import Command, Outcome
 from tests.support.domains import T_MAP, files_of
 from tests.support.naive_classical import optimal_plans
@@ -219,9 +220,7 @@ def test_pyperplan(name: str, tmp_path: Path) -> None:
     assert door.say(language, *files, plan).sentence == sentence
 
 
-@pytest.mark.parametrize(
-    "name", [*WORLDS, *(pytest.param(name, marks=pytest.mark.slow) for name in SHIPPED)]
-)
+@pytest.mark.parametrize("name", [*WORLDS, *slow(*SHIPPED)])
 def test_kstar_and_fast_downward(name: str, tmp_path: Path) -> None:
     """K* lists as many plans of least cost as there are with the sentence; the cost is the least."""
     planners = pytest.importorskip(

@@ -28,6 +28,7 @@ from planners.joint.model import show
 from planners.pddl.model_options import ModelOptions
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, UsageError
+from tests.support import slow, thorough
 from tests.support.domains import DOMAINS, own_task
 from tests.support.naive import numbered_sentences
 from tests.support.naive_classical import optimal_plans
@@ -35,8 +36,8 @@ from tests.support.task_languages import random_language, random_task_languages
 
 FORMS = {"explicit": 100_000, "select-then-apply": 0}
 #: How many random models of each number of robots; a second lot, much longer, runs on demand.
-NUMBER = {"few": 10, "many": 150}
-BOTH = pytest.mark.parametrize("lot", ["few", pytest.param("many", marks=pytest.mark.slow)])
+NUMBER = {"few": 5, "some": 10, "many": 150}
+EACH = pytest.mark.parametrize("lot", ["few", *thorough("some"), *slow("many")])
 
 
 @cache
@@ -70,7 +71,7 @@ def planned(exported: ExportedTask, plans: Iterable[Sequence[int]] | None = None
 
 
 @pytest.mark.thorough
-@BOTH
+@EACH
 def test_the_optimal_plans_are_the_plans_that_fit(
     lot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,7 +86,7 @@ def test_the_optimal_plans_are_the_plans_that_fit(
                 assert exported.classical.cost(exported.cost) == used.space.cost_of(used.task)
 
 
-@BOTH
+@EACH
 def test_one_term_in_every_state(lot: str) -> None:
     for used in tasks(lot):
         rows = np.concatenate((used.partition.rows, used.space.rows[used.space.state]))
@@ -169,7 +170,7 @@ def asked(
                     yield exported.formula, trace, other == words
 
 
-@BOTH
+@EACH
 def test_the_formula_is_true_of_the_plans_that_fit_and_of_no_other(lot: str) -> None:
     answers = Counter[bool]()
     slack = asked([within_slack("three-cells", 1)], 99, 99)
@@ -226,9 +227,7 @@ def test_a_plan_that_is_cut_off_or_none(monkeypatch: pytest.MonkeyPatch) -> None
 
 WITHIN_SLACK = [
     ("three-cells", 1, False),
-    ("three-cells", 1, True),
-    pytest.param("three-cells", 2, False, marks=pytest.mark.thorough),
-    pytest.param("t-map", 1, False, marks=pytest.mark.thorough),
+    *thorough(("three-cells", 1, True), ("three-cells", 2, False), ("t-map", 1, False)),
 ]
 
 

@@ -23,6 +23,7 @@ from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Note, ProvedImpossible
+from tests.support import thorough
 from tests.support.command import Command
 from tests.support.domains import files_of, read
 from tests.support.joint_twin import built
@@ -59,7 +60,7 @@ def some_tasks(model: JointModel, start: np.ndarray, most: int) -> list[ListedTa
     return [ListedTask(init, goal) for init in states for goal in goals]
 
 
-@pytest.mark.parametrize("kind", ["agent", "plain"])
+@pytest.mark.parametrize("kind", ["agent", *thorough("plain")])
 def test_random_tasks_have_the_same_plans(
     kind: str, monkeypatch: pytest.MonkeyPatch, searches: list[str]
 ) -> None:

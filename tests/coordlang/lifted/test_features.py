@@ -18,21 +18,16 @@ from planners.joint.tables import Rows
 from planners.loading import PlanningInstance
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Position
+from tests.support import thorough
 from tests.support.domains import loaded_from
 from tests.support.naive_features import members, value
 
 HERE = Position("test")
-WORLDS = ("grid/gwb2-3x3", "handover/exchange", "elevator/same-floor")
-MORE = [
-    pytest.param(name, marks=pytest.mark.thorough)
-    for name in [
-        "push-box/next-door",
-        "grid/gw2-2x3",
-        "charger/queue",
-        "vans/two-vans",
-        "t-map/problem",
-    ]
-]
+WORLDS = ("grid/gwb2-3x3", "elevator/same-floor")
+MORE = thorough(
+    *("handover/exchange", "push-box/next-door", "grid/gw2-2x3"),
+    *("charger/queue", "vans/two-vans", "t-map/problem"),
+)
 
 
 def world_of(loaded: PlanningInstance, points: dict[str, tuple[float, float]]) -> World:

@@ -77,6 +77,7 @@ def test_a_larger_problem(grounded: Language) -> None:
     assert api.verify(grounded, GRID, LARGER, jobs=1)
 
 
+@pytest.mark.thorough
 def test_an_unverified_language_covers_nothing(
     rings: Lifted, grounded: Language, plan: Path
 ) -> None:

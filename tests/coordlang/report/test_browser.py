@@ -24,6 +24,7 @@ from tests.coordlang.report.conftest import (
     make_world,
     refuted,
 )
+from tests.support import slow, thorough
 from tests.support.domains import T_MAP, files_of, read
 
 if TYPE_CHECKING:
@@ -55,12 +56,7 @@ LARGE = [
 
 
 @pytest.mark.parametrize(
-    ("domain", "problem", "tasks"),
-    [
-        WORLDS[0],
-        *(pytest.param(*world, marks=pytest.mark.thorough) for world in WORLDS[1:]),
-        *(pytest.param(*world, marks=pytest.mark.slow) for world in LARGE),
-    ],
+    ("domain", "problem", "tasks"), [WORLDS[0], *thorough(*WORLDS[1:]), *slow(*LARGE)]
 )
 def test_every_page_plays(open_page: Opener, domain: str, problem: str, tasks: str | None) -> None:
     """Every task of the page, at its end and in each robot's place; in the end nothing was logged."""
@@ -273,7 +269,9 @@ def test_the_picture_of_the_words(open_page: Opener) -> None:
     }
 
 
-@pytest.mark.parametrize(("domain", "problem", "tasks"), [WORLDS[0], WORLDS[2], WORLDS[3]])
+@pytest.mark.parametrize(
+    ("domain", "problem", "tasks"), [WORLDS[0], WORLDS[2], *thorough(WORLDS[3])]
+)
 def test_the_miscoordination(
     open_page: Opener, domain: str, problem: str, tasks: str | None
 ) -> None:

@@ -31,6 +31,7 @@ from tests.coordlang.report.conftest import (
     make_world,
     refuted,
 )
+from tests.support import thorough
 from tests.support.command import Command
 from tests.support.domains import T_MAP, files_of
 from tests.support.random_models import random_model
@@ -40,10 +41,7 @@ WORLDS: list[tuple[str, str, str | None]] = [
     ("handover", "two-doors", "all"),
     ("grid", "three-robots-3x3", None),
 ]
-MORE = [
-    pytest.param("lock", "both-in", "all", marks=pytest.mark.thorough),
-    pytest.param("elevator", "two-calls", "all", marks=pytest.mark.thorough),
-]
+MORE = [*thorough(("lock", "both-in", "all"), ("elevator", "two-calls", "all"))]
 
 
 @pytest.fixture(autouse=True)
@@ -237,6 +235,7 @@ def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -
     assert data_of(page.read_bytes())["tasks"][0]["title"] == "r1 c0-1 → c1-2"
 
 
+@pytest.mark.thorough
 def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None:
     sidecar = tmp_path / "mine.json"
     places = '{"c0-1": [9, 0], "c1-0": [0, 5], "c1-1": [9, 5], "c1-2": [20, 5]}'

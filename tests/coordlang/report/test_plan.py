@@ -13,7 +13,7 @@ from coordlang.report.plan import WIDTH, Heat, counted_heat, drawn_plan, floor_p
 from coordlang.report.task import select_tasks
 from planners.search.plan_space import PlanSpace
 from tests.coordlang.report.conftest import make_language
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.domains import all_tasks
 
 
@@ -74,7 +74,8 @@ def by_definition(spaces: list[PlanSpace]) -> Heat:
 
 
 @pytest.mark.parametrize(
-    ("domain", "problem"), [("t-map", "problem"), ("three-cells", "problem"), ("grid", "gw2-2x3")]
+    ("domain", "problem"),
+    [("t-map", "problem"), ("three-cells", "problem"), *thorough(("grid", "gw2-2x3"))],
 )
 def test_heat_is_that_of_the_definition(domain: str, problem: str) -> None:
     language, lifted, asked = make_language(domain, problem)

@@ -32,7 +32,7 @@ from planners.check.rules import Verdict, validate
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
-from tests.support import naive
+from tests.support import naive, slow, thorough
 from tests.support.candidates import first_break, steps_of
 from tests.support.domains import all_tasks, own_task
 from tests.support.random_spaces import random_spaces, runs, separable_spaces
@@ -66,10 +66,8 @@ def compared(seeds: range, robots: int) -> Counter[str]:
     ("robots", "seeds"),
     [
         (2, range(40)),
-        (3, range(25)),
-        pytest.param(2, range(1_000, 1_800), marks=pytest.mark.slow),
-        pytest.param(3, range(2_000, 2_800), marks=pytest.mark.slow),
-        pytest.param(4, range(3_000, 3_300), marks=pytest.mark.slow),
+        *thorough((3, range(25))),
+        *slow((2, range(1_000, 1_800)), (3, range(2_000, 2_800)), (4, range(3_000, 3_300))),
     ],
 )
 def test_probabilities_equal_the_definition(robots: int, seeds: range) -> None:

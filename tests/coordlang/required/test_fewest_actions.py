@@ -15,7 +15,7 @@ from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.command import Command
 from tests.support.domains import files_of
 from tests.support.joint_twin import built
@@ -35,7 +35,7 @@ def plans(loaded: PlanningInstance) -> set[Plan]:
     return listed(search(loaded.model, loaded.tasks[0]))
 
 
-@pytest.mark.parametrize(("kind", "number"), [("agent", 36), ("plain", 75)])
+@pytest.mark.parametrize(("kind", "number"), [("agent", 36), *thorough(("plain", 75))])
 def test_they_are_the_plans_of_the_other_cost(kind: Kind, number: int) -> None:
     cut = mixed = 0
     for seed in range(number):

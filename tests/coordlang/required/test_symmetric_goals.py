@@ -27,6 +27,7 @@ from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
 from planners.search.portions import PORTION
 from planners.system.errors import BadInput, ProvedImpossible
+from tests.support import slow, thorough
 from tests.support.domains import all_tasks, files_of, own_task
 from tests.support.random_models import random_model
 from tests.support.symmetric_worlds import GRID, world
@@ -65,9 +66,7 @@ def answer(candidates: Candidates, portion: float, by_symmetry: bool) -> FirstDi
             return None
 
 
-@pytest.mark.parametrize(
-    "seeds", [range(15), pytest.param(range(1_000, 1_300), marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("seeds", [range(15), *slow(range(1_000, 1_300))])
 def test_random_worlds(seeds: range) -> None:
     found = 0
     for seed in seeds:
@@ -151,7 +150,7 @@ def words(differences: FirstDifferences, seed: int) -> dict[int, int]:
     return {state: random.randrange(4) for state in differences.states.tolist()}
 
 
-@pytest.mark.parametrize(("robots", "number"), [(2, 40), (3, 20)])
+@pytest.mark.parametrize(("robots", "number"), [(2, 40), *thorough((3, 20))])
 def test_jobs_give_what_the_whole_gives(
     robots: int, number: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -181,7 +180,7 @@ def test_processes_and_kept_jobs_change_nothing(tmp_path: Path) -> None:
     assert verify_candidates(partition, candidates, kept, portion=60.0) == verdict
 
 
-@pytest.mark.parametrize("workers", [HERE, EAGER])
+@pytest.mark.parametrize("workers", [HERE, *thorough(EAGER)])
 def test_problems_are_jobs_of_coordination(workers: Workers, tmp_path: Path) -> None:
     domain, corners = files_of("grid", "corners-3x3")
     near = tmp_path / "near.pddl"

@@ -78,6 +78,7 @@ def test_robots_can_pass_or_it_is_said(
     assert found.record.radius == pytest.approx(radius or 0.2, abs=1e-3)
 
 
+@pytest.mark.thorough
 def test_a_robot_may_be_called_wall(tmp_path: Path) -> None:
     problem, words = tmp_path / "problem.pddl", tmp_path / "words.json"
     domain, shipped = files_of("corridor")
@@ -95,6 +96,7 @@ def test_nothing_is_said_where_all_is_simulated(recwarn: pytest.WarningsRecorder
     assert not [one for one in recwarn if issubclass(one.category, Note)]
 
 
+@pytest.mark.thorough
 def test_a_signal_ends_a_recording_without_a_word_of_others(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

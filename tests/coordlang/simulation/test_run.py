@@ -42,6 +42,7 @@ from coordlang.simulation.team import Mission
 from planners.pddl import parse_problem
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput
+from tests.support import thorough
 from tests.support.domains import ROOT
 from tests.support.simulation import floor_for, mission_of, runs
 from tests.support.symmetric_worlds import GRID
@@ -115,9 +116,7 @@ def test_robots_drive_off_together_however_far_each_has_to_turn() -> None:
     ("problem", "number"),
     [
         ("t-map/problem", 2),
-        pytest.param("corridor/problem", 20, marks=pytest.mark.thorough),
-        pytest.param("grid/gwb7-3x5", 20, marks=pytest.mark.thorough),
-        pytest.param("grid/three-robots-3x3", 20, marks=pytest.mark.thorough),
+        *thorough(("corridor/problem", 20), ("grid/gwb7-3x5", 20), ("grid/three-robots-3x3", 20)),
     ],
 )
 def test_shipped_maps(problem: str, number: int, step: str) -> None:
@@ -132,6 +131,7 @@ def test_messages_say_that_steps_are_done_and_nothing_is_said_by_the_clock() -> 
     assert by_barrier.seconds < by_clock.seconds, "a barrier opens before the period is over"
 
 
+@pytest.mark.thorough
 def test_without_a_sentence_what_the_model_says_breaks_does_break() -> None:
     found = runs("t-map", "nothing", Settings(), 6)
     assert {run.mixes for run in found} == {True, False}
@@ -177,6 +177,7 @@ def test_a_world_that_is_garbage_does_not_hold_up_the_next_one(
     assert not again.is_alive()
 
 
+@pytest.mark.thorough
 def test_within_a_word_robots_get_out_of_step() -> None:
     """Why a barrier for each word is not enough: the same choices, done in step, are a plan."""
     mission = mission_of("t-map", method="minimal")
@@ -199,8 +200,7 @@ def test_within_a_word_robots_get_out_of_step() -> None:
     [
         ("t-map/problem", 3),
         ("grid/gw1-2x2", 3),
-        pytest.param("corridor/problem", 20, marks=pytest.mark.thorough),
-        pytest.param("grid/three-robots-3x3", 20, marks=pytest.mark.thorough),
+        *thorough(("corridor/problem", 20), ("grid/three-robots-3x3", 20)),
     ],
 )
 def test_robots_without_a_common_step_wait_for_passings_alone(problem: str, number: int) -> None:
@@ -214,6 +214,7 @@ def test_robots_without_a_common_step_wait_for_passings_alone(problem: str, numb
         assert 0 < run_.messages <= len(acts)
 
 
+@pytest.mark.thorough
 def test_without_an_agreement_they_contradict_each_other_or_wait_for_ever() -> None:
     mission = mission_of("t-map", agreement="nothing", method="best", asynchronous=True)
     found = list(Simulation(mission, floor_for(mission), Settings(step="passings")).runs(8))
@@ -240,6 +241,7 @@ def test_a_detour_that_own_choices_allow_is_made() -> None:
         assert found.late == 0
 
 
+@pytest.mark.thorough
 def test_under_a_whole_plan_a_detour_can_be_had_only_if_it_is_on_it() -> None:
     wish = WishRecord("r2", 2, "(at r2 c0-4)")
     granted = set()

@@ -22,6 +22,7 @@ from coordlang.sites.building import Building, read_building
 from coordlang.sites.building_pddl import building_files
 from coordlang.sites.coordinates import read_coordinates
 from planners.system.errors import BadInput, Note, UsageError
+from tests.support import thorough
 from tests.support.command import Command
 from tests.support.domains import SHARED
 
@@ -304,9 +305,7 @@ def random_building(random: Random) -> str:
     return "coordinate_system: cartesian_meters\n" + text
 
 
-@pytest.mark.parametrize(
-    "seed", [*range(6), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(6, 12))]
-)
+@pytest.mark.parametrize("seed", [*range(6), *thorough(*range(6, 12))])
 def test_steps_are_those_of_the_definition(seed: int, tmp_path: Path) -> None:
     random = Random(seed)
     clearance = random.choice([0.0, 0.29, 0.83, 1.13])  # no distance of these points
@@ -382,9 +381,7 @@ MANY = ("levels: [" + "1," * 4_000_001 + "1]", ":1:", "more than 4,000,000 value
 
 
 @pytest.mark.parametrize(
-    ("change", "line", "message"),
-    [*WRONG, pytest.param(*MANY, marks=pytest.mark.thorough)],
-    ids=range(len(WRONG) + 1),
+    ("change", "line", "message"), [*WRONG, *thorough(MANY)], ids=range(len(WRONG) + 1)
 )
 def test_what_is_wrong_and_where(
     change: str | tuple[str, str], line: str, message: str, tmp_path: Path

@@ -50,6 +50,7 @@ from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.system.errors import Unsupported, UsageError
+from tests.support import thorough
 from tests.support.command import Command
 from tests.support.domains import ROOT, files_of, loaded_from
 
@@ -124,7 +125,7 @@ def steps_of(found: Any, plan: PartialOrderPlan) -> list[list[str]]:
     [
         ("handover", "one-door", {}),
         ("elevator", "same-floor", {}),
-        ("two-arms", "exchange", {"robots": ("arm1", "arm2")}),
+        *thorough(("two-arms", "exchange", {"robots": ("arm1", "arm2")})),
     ],
 )
 def test_the_plans_are_those_of_the_pddl_files(
@@ -364,9 +365,7 @@ def shortest(problem: Any) -> tuple[int, int] | None:
 SOME = (0, 1, 6, 7, 10)
 
 
-@pytest.mark.parametrize(
-    "seeds", [SOME, pytest.param(range(100), marks=pytest.mark.thorough)], ids=len
-)
+@pytest.mark.parametrize("seeds", [SOME, *thorough(range(100))], ids=len)
 def test_formulas_and_effects_mean_what_they_mean_to_the_library(seeds: Any) -> None:
     answers = Counter[str]()
     for seed in seeds:
@@ -760,6 +759,7 @@ def test_odd_names() -> None:
     assert made == ["x", "x__2", "_x", "x__3", "x__4", "object__2", "x"]
 
 
+@pytest.mark.thorough
 def test_the_engine_by_a_file_beside_the_program(tmp_path: Path) -> None:
     """The lines of docs/unified-planning.md: no `register` is needed."""
     page = (ROOT / "docs" / "unified-planning.md").read_text()

@@ -22,6 +22,7 @@ from unified_planning.test.examples import get_example_problems, multi_agent, ta
 from coordlang.unified import register
 from coordlang.unified.engine import CoordlangEngine
 from coordlang.unified.translation import FEATURES, translate
+from tests.support import thorough
 
 EXAMPLES: dict[str, Any] = {
     **get_example_problems(),
@@ -193,12 +194,10 @@ def shortest(problem: Any) -> int:
 
 
 #: One of them takes as long as all others together; of those for one agent every second is enough.
-NIGHTLY = {"ma_buttons", *[n for n in SUPPORTED if not n.startswith("ma")][1::2]}
+NIGHTLY = ["ma_buttons", *[n for n in SUPPORTED if not n.startswith("ma")][1::2]]
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.thorough] * (n in NIGHTLY)) for n in SUPPORTED]
-)
+@pytest.mark.parametrize("name", [*sorted({*SUPPORTED} - {*NIGHTLY}), *thorough(*NIGHTLY)])
 def test_what_is_solved_is_what_others_say(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -221,9 +220,7 @@ def test_what_is_solved_is_what_others_say(
     assert int(result.metrics["makespan"]) == len(plan.actions) == shortest(other)
 
 
-@pytest.mark.parametrize(
-    "name", ["ma-loader", pytest.param("ma_buttons", marks=pytest.mark.thorough)]
-)
+@pytest.mark.parametrize("name", ["ma-loader", *thorough("ma_buttons")])
 def test_agents_that_act_together(name: str) -> None:
     """Every order of the actions of a step is a plan, by unified-planning's own validator."""
     problem = EXAMPLES[name].problem

@@ -31,19 +31,17 @@ from coordlang.vocabulary.first_differences import first_differences
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
 from planners.search.portions import Explored
-from tests.support import naive
+from tests.support import naive, slow, thorough
 from tests.support.candidates import listed, small_candidates, steps_of
 from tests.support.random_spaces import random_spaces, runs
 from tests.support.texts import parsed
 
 #: (robots, plans of one task that the twin lists at most, models)
 SIZES = [
-    (2, 60, 12),
-    (3, 14, 10),
-    (4, 7, 6),
-    pytest.param(2, 60, 600, marks=pytest.mark.slow),
-    pytest.param(3, 14, 600, marks=pytest.mark.slow),
-    pytest.param(4, 7, 200, marks=pytest.mark.slow),
+    (2, 60, 8),
+    (3, 14, 6),
+    *thorough(*(more for more in ((2, 60, 20), (3, 14, 20), (4, 7, 6)))),
+    *slow((2, 60, 600), (3, 14, 600), (4, 7, 200)),
 ]
 
 
@@ -196,6 +194,7 @@ def may_part(
     return False
 
 
+@pytest.mark.thorough
 def test_sets_of_steps_of_long_plans() -> None:
     """Nothing recurses: three robots go 300 steps, and each has two ways to begin."""
     last, deepest = 300, sys.getrecursionlimit()

@@ -31,6 +31,7 @@ from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.minimal import MinimalSearch, refuting_clauses
 from planners.system.errors import OutOfTime, Refuted
 from planners.system.limits import time_left
+from tests.support import thorough
 from tests.support.candidates import small_candidates
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
@@ -199,7 +200,7 @@ def test_nothing_to_refute() -> None:
     assert not Cnf([frozenset({(0, 1)})], 2).refuted()
 
 
-@pytest.mark.parametrize(("robots", "number"), [(2, 6), (3, 3)])
+@pytest.mark.parametrize(("robots", "number"), [(2, 3), (3, 3), *thorough((2, 12), (3, 9))])
 def test_random_models(robots: int, number: int) -> None:
     """Every minimum of random models is proved by its certificate, and of none a larger one."""
     bounds: list[int] = []

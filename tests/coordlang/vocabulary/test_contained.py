@@ -26,7 +26,7 @@ from planners.joint.tables import Bools
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from planners.system.errors import Refuted
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.candidates import small_candidates
 from tests.support.domains import all_tasks
 from tests.support.symmetric_worlds import GRID, rename, world
@@ -54,7 +54,7 @@ def plans_by_task(space: PlanSpace, most: int = MOST) -> Iterator[tuple[int, int
         yield task, int(space.state[node]), int(end[space.goal[node]]), plans
 
 
-@pytest.mark.parametrize("number", [14, pytest.param(120, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("number", [14, *thorough(120)])
 def test_mixtures_of_plans_in_a_part_fail_in_the_part_iff_in_the_whole(number: int) -> None:
     """Any set of states: its plans are those that stay in it, or it is said to be no part."""
     good = bad = failing = 0
@@ -114,7 +114,7 @@ def states_under(space: PlanSpace, renaming: dict[str, str]) -> list[int]:
     return [number[frozenset(rename(a, renaming) for a in atoms)] for atoms in number]
 
 
-@pytest.mark.parametrize("seeds", [5, pytest.param(16, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("seeds", [5, *thorough(16)])
 def test_symmetries_of_a_part_are_the_renamings_that_keep_its_edges(seeds: int) -> None:
     """All renamings of the objects of random maps, on what is left without one of their cells."""
     more = fewer = 0
@@ -234,6 +234,7 @@ def ring(cells: int) -> list[tuple[int, int]]:
     return [(n, (n + 1) % cells) for n in range(cells)]
 
 
+@pytest.mark.thorough
 def test_tasks_of_one_orbit_are_those_whose_plans_pass_through_images_of_one_state() -> None:
     """Random maps and rings, each plan listed; orbits by the texts of states."""
     random, found_any, left_out = Random(0), 0, 0

@@ -19,7 +19,7 @@ from coordlang.vocabulary.counterexamples import CounterexampleWalk, Mixtures
 from coordlang.vocabulary.failing_tuples import FailingTuples, plan_states
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.domains import all_tasks
 from tests.support.naive import separation_clause
 from tests.support.random_models import random_model
@@ -86,8 +86,9 @@ def test_what_sets_refute_is_what_listing_refutes(robots: int | None, seeds: ran
     assert min(answers[True], answers[False]) >= 5
 
 
-def test_plans_within_slack_are_refuted_like_optimal_ones() -> None:
-    answers = compared(with_slack(range(36)), Random(1))
+@pytest.mark.parametrize("number", [14, *thorough(36)])
+def test_plans_within_slack_are_refuted_like_optimal_ones(number: int) -> None:
+    answers = compared(with_slack(range(number)), Random(1))
     assert min(answers[True], answers[False]) >= 5
 
 

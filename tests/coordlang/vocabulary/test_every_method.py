@@ -14,7 +14,7 @@ from coordlang.vocabulary import METHODS
 from coordlang.vocabulary.job import Assignment
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfMemory, OutOfTime
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.candidates import small_candidates
 from tests.support.command import Command
 from tests.support.domains import all_tasks, files_of, own_task
@@ -66,6 +66,7 @@ def test_stopped_while_it_checks(
     assert not built.language.guarantee.proved_minimal
 
 
+@pytest.mark.thorough
 def test_few_words_that_leave_many_plans_open() -> None:
     """Of one task: as few words as the exact method proves, and no less freedom than it leaves."""
     found = build_language(own_task("grid", "corners-4x4"))
@@ -75,9 +76,7 @@ def test_few_words_that_leave_many_plans_open() -> None:
     assert found.figures["flexibility"] >= 86 > found.figures["work"] / 1_000
 
 
-@pytest.mark.parametrize(
-    ("stem", "least"), [("gw2-2x3", 5), pytest.param("gw3-2x4", 6, marks=pytest.mark.thorough)]
-)
+@pytest.mark.parametrize(("stem", "least"), [("gw2-2x3", 5), *thorough(("gw3-2x4", 6))])
 def test_effort_buys_words_and_bounds(stem: str, least: int) -> None:
     candidates = all_tasks("grid", stem)
     known = [
@@ -104,6 +103,7 @@ def test_what_more_effort_might_bring(coordlang: Command, tmp_path: Path) -> Non
     assert "--effort" not in proved.out
 
 
+@pytest.mark.thorough
 def test_single_states_are_merged_before_effort_is_spent_on_bounds() -> None:
     """Without a common step no words are greedy's: each state begins with its own."""
     candidates = all_tasks("grid", "gw2-2x3", ModelOptions(asynchronous=True))

@@ -19,7 +19,7 @@ from coordlang.required.choices import Choices
 from coordlang.vocabulary.flexible import flexibility_bounds, flexible
 from coordlang.vocabulary.job import Assignment, Outcome
 from planners.search.plans import Plan
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.candidates import (
     MOST,
     failing,
@@ -153,11 +153,11 @@ def largest(plans: list[Plan], robot: int, robots: int) -> list[int]:
     return [max(len(chosen) for chosen in free if plan in chosen) for plan in plans]
 
 
-@pytest.mark.parametrize("robots", [2, 3])
-def test_bounds_are_the_largest_sets_that_mix(robots: int) -> None:
+@pytest.mark.parametrize(("robots", "number"), [(2, 20), (3, 40), *thorough((2, 40))])
+def test_bounds_are_the_largest_sets_that_mix(robots: int, number: int) -> None:
     """With two robots that is exact; with three the least over who is divided from the others."""
     coordinated = 0
-    for seed in range(40):
+    for seed in range(number):
         candidates = on_graph(seed, robots)
         if candidates is None:
             continue

@@ -24,6 +24,7 @@ from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.languages import Languages
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.sat import PartitionProblem
+from tests.support import slow, thorough
 from tests.support.candidates import small_candidates, states_of
 from tests.support.domains import all_tasks
 from tests.support.random_spaces import random_spaces
@@ -32,11 +33,7 @@ from tests.support.task_languages import built_for
 
 @pytest.mark.parametrize(
     ("folder", "stem", "words"),
-    [
-        ("grid-joint", "gw1-2x2", 3),
-        ("grid", "gw2-2x3", 5),
-        pytest.param("grid", "gwb2-3x3", 3, marks=pytest.mark.thorough),
-    ],
+    [("grid-joint", "gw1-2x2", 3), ("grid", "gw2-2x3", 5), *thorough(("grid", "gwb2-3x3", 3))],
 )
 def test_known_minima(folder: str, stem: str, words: int) -> None:
     """More of them stand in the README files of the domains."""
@@ -88,13 +85,7 @@ def test_one_of_symmetric_partitions(
 
 
 @pytest.mark.parametrize(
-    ("robots", "most", "examples"),
-    [
-        (2, 40, 70),
-        (3, 14, 18),
-        pytest.param(2, 40, 280, marks=pytest.mark.slow),
-        pytest.param(3, 14, 140, marks=pytest.mark.slow),
-    ],
+    ("robots", "most", "examples"), [(2, 40, 70), (3, 14, 18), *slow((2, 40, 280), (3, 14, 140))]
 )
 def test_minimal_equals_exhaustive(robots: int, most: int, examples: int) -> None:
     """On random models with two and three robots, all pairs of states or one partial goal."""
@@ -151,10 +142,7 @@ def merges_of(found: list[dict[int, int]], candidates: Candidates) -> int:
 
 @pytest.mark.parametrize(
     ("robots", "seeds"),
-    [
-        (2, range(30)),
-        *(pytest.param(robots, range(80), marks=pytest.mark.thorough) for robots in (2, 3, None)),
-    ],
+    [(2, range(30)), *thorough((2, range(80)), (3, range(80)), (None, range(80)))],
 )
 def test_random_models_merge_until_no_merge_is_left(robots: int | None, seeds: range) -> None:
     sizes: Counter[int] = Counter()
@@ -176,7 +164,7 @@ def test_shipped_worlds_merge_until_no_merge_is_left(folder: str, stem: str, mos
     assert 3 <= merges_of(languages(candidates, symmetry_group(candidates)), candidates) <= most
 
 
-@pytest.mark.parametrize(("folder", "stem"), [("grid", "gw1-2x2"), ("t-map", "problem")])
+@pytest.mark.parametrize(("folder", "stem"), [("t-map", "problem"), *thorough(("grid", "gw1-2x2"))])
 def test_walks_of_goals_up_to_symmetry_refute_what_is_no_language(folder: str, stem: str) -> None:
     """Nearly all states have words of their own: what little fails is at goals of any orbit."""
     candidates = all_tasks(folder, stem)

@@ -30,7 +30,7 @@ from coordlang.vocabulary.sat import END, START, Undecided
 from coordlang.vocabulary.warped_pairs import PairsApart, WarpedPairs, failing_pairs
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.candidates import (
     MOST,
     REQUIRING,
@@ -44,10 +44,7 @@ from tests.support.domains import own_task
 from tests.support.texts import parsed
 
 
-@pytest.mark.parametrize(
-    ("robots", "number"),
-    [(2, 10), (3, 5), *(pytest.param(n, 80, marks=pytest.mark.thorough) for n in (2, 3))],
-)
+@pytest.mark.parametrize(("robots", "number"), [(2, 5), *thorough((2, 80), (3, 80))])
 def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: int) -> None:
     models = (c for _, c in small_candidates(robots, states=9, plans=MOST, requires=True))
     told, own = 0, [own_task("grid", "corners-3x3"), own_task("corridor")] if robots == 2 else []
@@ -116,10 +113,7 @@ def parted(two: Sequence[Sequence[int]]) -> Sequence[Sequence[int]]:
     return [] if any(same[first:]) else [states[first - 1 :] for states in two]
 
 
-@pytest.mark.parametrize(
-    ("robots", "number"),
-    [(2, 20), (3, 20), *(pytest.param(n, 150, marks=pytest.mark.thorough) for n in (2, 3))],
-)
+@pytest.mark.parametrize(("robots", "number"), [(3, 20), *thorough((2, 150), (3, 150))])
 def test_all_warping_paths_of_pairs_of_plans_are_the_paths_of_a_graph(
     robots: int, number: int
 ) -> None:
@@ -264,11 +258,9 @@ def test_as_few_words_suffice_as_of_all_partitions(
 @pytest.mark.parametrize(
     ("robots", "number", "asynchronous"),
     [
-        (2, 20, False),
-        (3, 20, False),
-        (2, 25, True),
-        *(pytest.param(n, 100, False, marks=pytest.mark.thorough) for n in (2, 3, 4)),
-        pytest.param(3, 60, True, marks=pytest.mark.thorough),
+        (3, 12, False),
+        (2, 12, True),
+        *thorough((2, 100, False), (3, 100, False), (4, 100, False), (2, 60, True), (3, 60, True)),
     ],
 )
 def test_as_few_words_of_random_models_suffice_as_of_all_partitions(

@@ -13,7 +13,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.required.composition_walk import DifferenceWalk
 from coordlang.vocabulary.exhaustive import partitions
-from tests.support import naive
+from tests.support import naive, slow, thorough
 from tests.support.candidates import listed, small_candidates, states_of
 from tests.support.domains import all_tasks
 
@@ -61,15 +61,10 @@ def least(states: list[int], wanted: set[Demand]) -> int:
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
-@pytest.mark.parametrize("written", [pytest.param(True, marks=pytest.mark.thorough), False])
+@pytest.mark.parametrize("written", [*thorough(True), False])
 @pytest.mark.parametrize(
     ("robots", "most", "number"),
-    [
-        (2, 40, 5),
-        (3, 14, 4),
-        pytest.param(2, 40, 200, marks=pytest.mark.slow),
-        pytest.param(3, 14, 100, marks=pytest.mark.slow),
-    ],
+    [(2, 40, 5), *thorough((3, 14, 4)), *slow((2, 40, 200), (3, 14, 100))],
 )
 def test_against_the_theorem(
     robots: int,
@@ -115,7 +110,7 @@ def test_against_the_theorem(
         ("three-cells", "problem", 3, 6),
         ("grid", "gw1-2x2", 6, 8),
         ("grid", "gw2-2x3", 7, 13),
-        pytest.param("grid", "gwb2-3x3", 6, 8, marks=pytest.mark.thorough),
+        *thorough(("grid", "gwb2-3x3", 6, 8)),
     ],
 )
 def test_known_minima(folder: str, stem: str, both: int, alpha: int) -> None:

@@ -21,6 +21,7 @@ from coordlang.vocabulary.first_differences import first_differences
 from planners.pddl.model_options import ModelOptions
 from planners.search.plans import counts
 from planners.system.errors import BadInput, ProvedImpossible, Refuted, UsageError
+from tests.support import thorough
 from tests.support.domains import all_tasks, own_task
 from tests.support.naive import is_language, sentence
 from tests.support.random_models import random_model
@@ -44,12 +45,7 @@ def small_tasks(seeds: range, robots: int) -> Iterator[Candidates]:
 
 
 @pytest.mark.parametrize(
-    ("robots", "seeds"),
-    [
-        (2, range(14)),
-        pytest.param(2, range(14, 250), marks=pytest.mark.thorough),
-        pytest.param(3, range(60), marks=pytest.mark.thorough),
-    ],
+    ("robots", "seeds"), [(2, range(14)), *thorough((2, range(14, 250)), (3, range(60)))]
 )
 def test_verdicts_and_least_numbers_are_those_of_the_definition(robots: int, seeds: range) -> None:
     seen: Counter[str] = Counter()

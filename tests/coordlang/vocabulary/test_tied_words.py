@@ -32,6 +32,7 @@ from coordlang.vocabulary.tied_words import TiedWords, _Kind, classes_by_facts
 from planners.joint.tables import Ints
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
+from tests.support import thorough
 from tests.support.candidates import failing, is_language, small_candidates
 from tests.support.domains import all_tasks, own_task
 
@@ -223,7 +224,7 @@ def test_one_fact_decides_who_goes_round() -> None:
 
 
 @pytest.mark.parametrize(
-    ("robots", "separable", "models"), [(2, True, 3), (2, False, 6), (3, False, 5)]
+    ("robots", "separable", "models"), [(2, False, 6), (3, False, 5), *thorough((2, True, 3))]
 )
 def test_each_class_a_word_is_a_language(robots: int, separable: bool, models: int) -> None:
     """Some facts suffice iff all facts do, and then each choice that is told is a language."""

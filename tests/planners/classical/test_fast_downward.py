@@ -26,6 +26,7 @@ from planners.pddl.model_options import Cost
 from planners.search.optimal_plans import search
 from planners.system.errors import OutOfMemory, OutOfTime
 from planners.system.limits import time_limit
+from tests.support import thorough
 from tests.support.classical_models import FORMS, MODELS, read
 from tests.support.domains import ROOT
 from tests.support.jobs import until
@@ -219,7 +220,7 @@ def test_a_parent_that_is_killed_takes_everything_with_it(tmp_path: Path) -> Non
     until(lambda: not processes(tmp_path))
 
 
-@pytest.mark.parametrize("limit", [20_000_000, 45_000_000])
+@pytest.mark.parametrize("limit", [20_000_000, *thorough(45_000_000)])
 def test_too_little_memory_is_an_error_of_its_own(
     limit: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

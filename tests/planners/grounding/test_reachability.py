@@ -21,6 +21,7 @@ from planners.search.optimal_plans import search
 from planners.search.reachable import explore
 from planners.system.errors import OutOfTime, ProvedImpossible
 from planners.system.limits import time_limit
+from tests.support import thorough
 from tests.support.joint_twin import built, check_model
 from tests.support.random_pddl import Kind, RandomModel, random_model
 from tests.support.texts import model_of
@@ -99,7 +100,7 @@ except MemoryError:
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-@pytest.mark.parametrize("left", [2, 14])
+@pytest.mark.parametrize("left", [2, *thorough(14)])
 def test_the_memory_limit_ends_clingo(left: int) -> None:
     run = subprocess.run([sys.executable, "-c", SMALL, str(left)], capture_output=True, text=True)
     assert (run.returncode, run.stdout, run.stderr) == (0, "no memory\n", "")
@@ -276,7 +277,7 @@ def test_an_unreachable_goal_comes_with_the_interference_met_most_often() -> Non
     assert said in str(caught.value.remedy)
 
 
-@pytest.mark.parametrize("kind", ["agent", "plain"])
+@pytest.mark.parametrize("kind", ["agent", *thorough("plain")])
 def test_in_random_models_what_is_said_is_true_of_every_reachable_state(kind: Kind) -> None:
     told = 0
     for seed in range(80):

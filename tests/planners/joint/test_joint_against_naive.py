@@ -8,12 +8,13 @@ from hypothesis import Phase, event, given, settings
 from hypothesis import strategies as st
 
 from planners.grounding.actions import idling_schemas
+from tests.support import slow, thorough
 from tests.support.joint_twin import built, check_model, twin_of
 from tests.support.random_models import random_threes
 from tests.support.random_pddl import KINDS, Kind, RandomModel, random_model
 
 
-@pytest.mark.parametrize("number", [20, pytest.param(600, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [10, *thorough(40), *slow(600)])
 @pytest.mark.parametrize("kind", KINDS)
 def test_same_joint_steps_and_optimal_plans(kind: Kind, number: int) -> None:
     """Exactly the same joint steps in every reachable state, and exactly the same optimal plans."""
@@ -26,7 +27,7 @@ def test_same_joint_steps_and_optimal_plans(kind: Kind, number: int) -> None:
     compare()
 
 
-@pytest.mark.parametrize("number", [16, pytest.param(600, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [6, *thorough(40), *slow(600)])
 def test_same_joint_steps_where_a_third_robot_decides(number: int) -> None:
     for seed in range(number):
         check_model(random_threes(seed), lambda _: None)

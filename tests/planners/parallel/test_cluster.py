@@ -152,6 +152,7 @@ def test_there_is_no_cluster(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.thorough
 def test_the_command_says_it_within_its_limit(silence: str) -> None:
     files = [DOMAINS / "grid" / f"{stem}.pddl" for stem in ("domain", "corners-6x6")]
     limits = ["--tasks", "all", "-o", "-", "--scheduler", silence, "--time-limit", "3"]

@@ -28,7 +28,7 @@ from planners.parallel.workers import workers as given_workers
 from planners.system.errors import BadInput, Note, OutOfMemory, OutOfTime, UsageError
 from planners.system.limits import address_space, limited_memory, time_limit
 from planners.system.writing import is_device, write_atomically
-from tests.support import jobs
+from tests.support import jobs, thorough
 from tests.support.command import program
 from tests.support.domains import ROOT
 from tests.support.jobs import batch, runs, until, workers
@@ -114,7 +114,7 @@ def test_no_worker_is_left_where_time_is_over_or_the_iterator_is_left(tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("number", "count"), [(signal.SIGTERM, 3), (signal.SIGKILL, 3), (signal.SIGHUP, 2)]
+    ("number", "count"), [(signal.SIGKILL, 3), *thorough((signal.SIGTERM, 3), (signal.SIGHUP, 2))]
 )
 def test_one_worker_is_ended_and_its_job_done_by_another(
     number: signal.Signals, count: int, tmp_path: Path
@@ -145,6 +145,7 @@ def test_workers_that_cannot_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     assert "--jobs 1" in str(error.value)
 
 
+@pytest.mark.thorough
 def test_a_script_without_main_guard_is_not_run_again(tmp_path: Path) -> None:
     line = "print(len(list(Workers(2).tables(jobs.batch(jobs.squares, 1, [range(2)] * 2)))))\n"
     (tmp_path / "script.py").write_text(SCRIPT + line)

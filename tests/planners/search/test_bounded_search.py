@@ -22,6 +22,7 @@ from planners.search.optimal_plans import search, search_with_effort
 from planners.search.plans import counts
 from planners.search.reachable import Exploration
 from planners.system.errors import BadInput, ProvedImpossible
+from tests.support import slow, thorough
 from tests.support.domains import world_of
 from tests.support.random_models import random_threes
 from tests.support.random_spaces import blind_search, equal, random_instance
@@ -152,11 +153,13 @@ FAMILIES: dict[str, Callable[[int], PlanningInstance | None]] = {
     [
         ("any", range(34)),
         ("threes", range(18)),
-        ("rooms", (*range(4, 17), 21, 20, 18, 30, 19, 34)),
-        pytest.param("rooms", range(22), marks=pytest.mark.thorough),
-        pytest.param("any", range(10_000, 12_000), marks=pytest.mark.slow),
-        pytest.param("threes", range(10_000, 10_800), marks=pytest.mark.slow),
-        pytest.param("rooms", range(10_000, 10_400), marks=pytest.mark.slow),
+        ("rooms", (3, 11, 12, 14, 15, 16, 17, 20, 21, 30)),
+        *thorough(("rooms", (*range(22), 30, 34))),
+        *slow(
+            ("any", range(10_000, 12_000)),
+            ("threes", range(10_000, 10_800)),
+            ("rooms", range(10_000, 10_400)),
+        ),
     ],
 )
 def test_bounds_lose_no_optimal_plan(family: str, seeds: Sequence[int]) -> None:

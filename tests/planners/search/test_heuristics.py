@@ -20,6 +20,7 @@ from planners.search.reachable import Space, explore
 from planners.search.search_estimate import estimate
 from planners.search.state_variables import StateVariable, state_variables
 from planners.system.errors import BadInput, ProvedImpossible
+from tests.support import thorough
 from tests.support.domains import loaded_from
 from tests.support.joint_twin import built
 from tests.support.random_models import random_threes
@@ -157,7 +158,7 @@ def walking(robots: int, places: int, goal: str) -> PlanningInstance:
     return model_of(WALK, problem)
 
 
-@pytest.mark.parametrize("style", ["agent", "plain", "joint"])
+@pytest.mark.parametrize("style", ["agent", *thorough("plain"), "joint"])
 def test_layers_bounds_and_choices_are_those_of_the_whole_search(style: str) -> None:
     solved = unsolved = 0
     for seed in range(40):

@@ -21,6 +21,7 @@ from planners.search import kept_plans
 from planners.search.portions import Explored
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Note, OutOfTime, ProvedImpossible
+from tests.support import thorough
 from tests.support.domains import files_of
 from tests.support.random_pddl import KINDS, random_model
 from tests.support.random_spaces import equal
@@ -67,9 +68,10 @@ def test_nothing_is_kept_unasked(folder: Store, searches: list[str]) -> None:
     assert (len(searches), entries(folder)) == (2, [])
 
 
-def test_random_models_come_back_as_they_were(folder: Store, searches: list[str]) -> None:
+@pytest.mark.parametrize("number", [9, *thorough(30)])
+def test_random_models_come_back(folder: Store, searches: list[str], number: int) -> None:
     kept = 0
-    for seed in range(30):
+    for seed in range(number):
         text = random_model(seed, KINDS[seed % 3])
         for cost in get_args(Cost):
             options = ModelOptions(unowned=text.unowned, cost=cost)

@@ -15,6 +15,7 @@ from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans, texts
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
+from tests.support import thorough
 from tests.support.domains import loaded_from
 from tests.support.naive_joint_steps import Labels, Price, Twin
 from tests.support.random_models import random_model
@@ -51,12 +52,7 @@ def loaded(folder: str, stem: str, slack: int, **options: object) -> PlanningIns
 
 @pytest.mark.parametrize(
     ("robots", "seeds"),
-    [
-        (2, range(8)),
-        (3, range(3)),
-        pytest.param(2, range(8, 250), marks=pytest.mark.thorough),
-        pytest.param(3, range(3, 80), marks=pytest.mark.thorough),
-    ],
+    [(2, range(8)), (3, range(3)), *thorough((2, range(8, 250)), (3, range(3, 80)))],
 )
 def test_random_tasks_have_the_plans_that_the_definition_lists(robots: int, seeds: range) -> None:
     """And no node of a task's graph stands for the same state and the same steps left twice."""
@@ -88,7 +84,7 @@ def test_random_tasks_have_the_plans_that_the_definition_lists(robots: int, seed
 
 @pytest.mark.parametrize(
     ("name", "makespan", "counts"),
-    [pytest.param(*row, marks=[pytest.mark.thorough] * (n > 2)) for n, row in enumerate(COUNTS)],
+    [*COUNTS[:3], *thorough(*COUNTS[3:])],
 )
 def test_counts_of_shipped_problems(name: str, makespan: int, counts: tuple[int, ...]) -> None:
     folder, stem = name.split("/")
