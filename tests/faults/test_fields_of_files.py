@@ -293,7 +293,7 @@ def test_lifted_files_and_coordinates(coordlang: Command, tmp_path: Path, every:
             assert made["guarantee"]["lower_bound"] == 1
 
 
-@SOME
+@pytest.mark.parametrize("every", [7, *thorough(1)])
 def test_task_files_and_plans(coordlang: Command, tmp_path: Path, every: int) -> None:
     files = files_of(CELLS)
     language, tasks, steps = (tmp_path / name for name in ("l.json", "t.json", "p.json"))

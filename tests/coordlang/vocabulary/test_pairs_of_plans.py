@@ -44,7 +44,7 @@ from tests.support.domains import own_task
 from tests.support.texts import parsed
 
 
-@pytest.mark.parametrize(("robots", "number"), [(2, 5), *thorough((2, 80), (3, 80))])
+@pytest.mark.parametrize(("robots", "number"), [(2, 5), (3, 5), *thorough((2, 80), (3, 80))])
 def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: int) -> None:
     models = (c for _, c in small_candidates(robots, states=9, plans=MOST, requires=True))
     told, own = 0, [own_task("grid", "corners-3x3"), own_task("corridor")] if robots == 2 else []
