@@ -32,7 +32,7 @@ from coordlang.execution.fleet_log import (
     Version,
     decoded,
 )
-from coordlang.execution.monitor import EventMonitor, MonitorError, NotPossible, drawn
+from coordlang.execution.monitor import EventMonitor, MonitorError, NotPossible, drawn, plain_text
 from planners.system.errors import Refuted
 
 #: In the time after which a robot counts as silent each one is heard so often, if it has nothing
@@ -163,7 +163,7 @@ class Executive:
         number, subaction = self.underway
         if said.get("event", number) != number:
             raise ValueError(f"event {number} is under way")
-        if said["done"] is not True and " ".join(str(said["done"]).lower().split()) != subaction:
+        if said["done"] is not True and plain_text(str(said["done"])) != subaction:
             raise ValueError(f"event {number} is {subaction}")
         self._own.advance(ended=number)
         self._to_tell |= {*self.others}

@@ -625,7 +625,7 @@ def _check_shape(value: Any, shape: Any, where: str, *keys: str) -> None:
 
 
 def _check_plain(text: Any, where: str) -> None:
-    if not isinstance(text, str) or not text.isprintable() or _plain_or_none(text) != text:
+    if not isinstance(text, str) or not text.isprintable() or plain_text(text) != text:
         raise _broken(f"{where} has {_shown(text)} in place of {_PDDL}")
 
 
@@ -726,7 +726,7 @@ def _plain(text: str | None) -> str:
     """PDDL text in lower case with single spaces; raises `MonitorError` for anything else."""
     if text is None:
         return IDLE
-    plain = _plain_or_none(text) if isinstance(text, str) else None
+    plain = plain_text(text) if isinstance(text, str) else None
     if plain is None:
         raise MonitorError(
             f"'{_shown(text)}' is no PDDL text such as (move r1 a b), and not 'idle'"
@@ -734,7 +734,8 @@ def _plain(text: str | None) -> str:
     return plain
 
 
-def _plain_or_none(text: str) -> str | None:
+def plain_text(text: str) -> str | None:
+    """PDDL text in lower case with single spaces, or ``idle``; None for anything else."""
     plain = _AROUND_PARENTHESES.sub(r"\1", " ".join(text.lower().split()))
     return plain if plain == IDLE or _PDDL_TEXT.fullmatch(plain) else None
 

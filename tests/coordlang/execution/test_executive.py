@@ -184,7 +184,7 @@ class Fleet:
                 return
             own = self.at.get(name)
             if own is not None and own.underway == (number, subaction):
-                done = json.dumps({"event": number, "done": subaction})
+                done = json.dumps({"event": number, "done": subaction.upper().replace("(", " ( ")})
                 self.after(name, lambda own: own.reads(done, self.now))
             elif own is None or own._monitor is None:
                 self.later(0.5, end)
