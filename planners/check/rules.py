@@ -8,7 +8,8 @@ with them, only the lifted nouns and the robots.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 from itertools import product
 
 from planners.check.meaning import Binding, Literal, Meaning, Moment, State, ground_atom, text_of
@@ -38,7 +39,7 @@ class Instance:
 
     schema: Schema
     name: StepAtom
-    binding: Binding
+    binding: Binding = field(compare=False)
     owners: tuple[int, ...]
 
     @property
@@ -62,7 +63,7 @@ class Rules:
     def __init__(self, domain: Domain, problem: Problem, team: Team) -> None:
         self.domain, self.problem, self.team = domain, problem, team
         self.meaning = Meaning(domain, problem, team)
-        self._touched: dict[tuple[StepAtom, StepAtom | None], Touched] = {}
+        self.touched = cache(self._touched)
 
     def step(self, state: State, labels: Labels, joint_action: str | None = None) -> State | str:
         """The state after a joint step, or the first rule that it breaks, in words.
@@ -222,32 +223,26 @@ class Rules:
             self._matches(by_name[v], one) & self._matches(by_name[w], other) for v, w in pairs
         )
 
-    def touched(self, action: Instance, other: Instance | None = None) -> Touched:
+    def _touched(self, action: Instance, other: Instance | None = None) -> Touched:
         """Conditional effects count as if they fired and their conditions as required.
 
         Adding wins over deleting.  Beside ``other``, effects count whose conditions are true in
         some state with exactly these two subactions in the step.
         """
-        key = action.name, other.name if other else None
-        if key in self._touched:
-            return self._touched[key]
         pair = frozenset((action.name, other.name)) if other else None
         own = self.meaning.required(action.schema.precondition, action.binding, True, action.owners)
         needs = [own]
         changes: dict[bool, set[Atom]] = {True: set(), False: set()}
         for effect in action.schema.effects:
             for binding in self.meaning.bindings(effect.variables, action.binding):
-                required = self.meaning.required(effect.condition, binding, True, ())
-                fires = self.meaning.holds(effect.condition, binding, True, Moment(None, pair))
-                if required is not False and fires:
-                    needs.append(required)
+                if self.meaning.holds(effect.condition, binding, True, Moment(None, pair)):
+                    needs.append(self.meaning.required(effect.condition, binding, True, ()))
                     changes[effect.adds].add(ground_atom(effect.atom, binding))
         literals = frozenset[Literal]().union(
             *(part for part in needs if not isinstance(part, bool))
         )
         adds, deletes = frozenset(changes[True]), frozenset(changes[False] - changes[True])
-        self._touched[key] = Touched(literals, adds, deletes)
-        return self._touched[key]
+        return Touched(literals, adds, deletes)
 
     def _after(self, state: State, actions: Iterable[Instance]) -> State:
         """All effects together; an atom that is both added and deleted becomes true."""
