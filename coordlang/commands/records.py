@@ -284,8 +284,8 @@ class PlansOptions(AnswerOptions):
     used = "only_count most sample"
     example = "{MAP} --count"
     form: Literal["ipc", "json"] = cli_option("ipc", "How plans are written.", names="--format")
-    listing: Listing = group(Listing)
     source: Source = group(Source, without="words_see_slack")
+    listing: Listing = group(Listing)
 
 
 class CheckOptions(AnswerOptions):
@@ -304,8 +304,8 @@ class CoordinationOptions(AnswerOptions):
     """Decide which tasks require coordination, with a miscoordination shown."""
 
     used = "asynchronous jobs as_json"
-    work: Jobs = group(Jobs)
     source: Source = group(Source, without="words_see_slack")
+    work: Jobs = group(Jobs)
 
 
 class TasksOptions(AnswerOptions):
@@ -333,7 +333,6 @@ class BuildOptions(AnswerOptions):
     tasks: TasksSource | None = option(
         None, "Tasks: every pair of reachable states, or a task file.", "all|FILE"
     )
-    way: MethodOptions = group(MethodOptions)
     words: int | None = option(
         None,
         "At most K words, under which robots fail least often.",
@@ -353,8 +352,9 @@ class BuildOptions(AnswerOptions):
     certificate: str | None = cli_option(
         None, "Also write why fewer words do not suffice.", "FILE", is_output=True
     )
-    work: Jobs = group(Jobs)
     source: Source = group(Source)
+    way: MethodOptions = group(MethodOptions)
+    work: Jobs = group(Jobs)
 
 
 class VerifyOptions(AnswerOptions):
@@ -391,7 +391,6 @@ class LiftOptions(AnswerOptions):
 
     used = "tasks check output"
     example = "{GRID} --tasks all -o lifted.json"
-    source: Source = group(Source, without="slack words_see_slack")
     tasks: Literal["all"] | None = option(None, "Tasks: every pair of reachable states.")
     check: Sequence[ProblemSource] = option(
         (), "Verify on this problem, too, or learn from it.", "PROBLEM", without="factored"
@@ -404,6 +403,7 @@ class LiftOptions(AnswerOptions):
     jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
     output: str = result_option("The lifted file (.json, .json.gz)", "LIFTED")
     seed: int = option(0, "Seed of all random choices.", least=0)
+    source: Source = group(Source, without="slack words_see_slack")
 
 
 class GroundOptions(PlanningOptions):
@@ -443,9 +443,9 @@ class UnderstandOptions(AnswerOptions):
     doing = "finding the plans with the sentence"
     used = "only_count most output"
     example = 't-map.json {MAP} "w0 w2 w1 w0" -o plan.txt'
-    listing: Listing = group(Listing)
     form: Literal["ipc", "json"] = cli_option("ipc", "json: with their graph.", names="--format")
     output: str | None = output_option("Write to this file instead of stdout.")
+    listing: Listing = group(Listing)
 
 
 class PlanOptions(AnswerOptions):

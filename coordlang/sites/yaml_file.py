@@ -44,17 +44,13 @@ class Value:
         """Whether it is a list."""
         return isinstance(self.node, yaml.SequenceNode)
 
-    @property
-    def _is_empty(self) -> bool:
-        return self._plain() in _EMPTY
-
     def wrong(self, what: str, remedy: str) -> BadInput:
         """The error of this value, with file, line and column (the caller raises it)."""
         return self.position.fail(what, remedy)
 
     def mapping(self) -> dict[str, Value]:
         """The values of a mapping by their keys; none for an empty value."""
-        if self._is_empty:
+        if self._plain() in _EMPTY:
             return {}
         if not isinstance(self.node, yaml.MappingNode):
             raise self._not("a mapping")
@@ -69,7 +65,7 @@ class Value:
 
     def list(self, least: int = 0) -> Sequence[Value]:
         """The values of a list of at least so many; none for an empty value."""
-        if self._is_empty and not least:
+        if self._plain() in _EMPTY and not least:
             return ()
         if not self.is_list or len(self.node.value) < least:
             raise self._not(f"a list of {least} or more" if least else "a list")
@@ -79,7 +75,7 @@ class Value:
         """A text; a number or a flag as it is written, and nothing for an empty value."""
         if not isinstance(self.node, yaml.ScalarNode):
             raise self._not("a text")
-        return "" if self._is_empty else str(self.node.value)
+        return "" if self._plain() in _EMPTY else str(self.node.value)
 
     def number(self) -> float:
         """A finite decimal number."""

@@ -87,11 +87,6 @@ class StagedAction:
         checks = ["check"] if self.checks != TRUE or self.groups else []
         return [*checks, *(["undo"] if self.early else []), "apply"]
 
-    @property
-    def unselected(self) -> tuple[Atom, bool]:
-        """What says that it is not selected, to those whom it rules out."""
-        return (self.selected, False) if self.mark is None else (self.mark, True)
-
     def may_meet(self, other: StagedAction) -> bool:
         """Whether both may be selected in one step."""
         clash = other.robot == self.robot or other.number in self.clashes
@@ -274,7 +269,8 @@ class _SelectThenApply:
         # No earlier robot has selected what cannot share a step with it.
         clashing = [self._all[number] for number in action.clashes]
         earlier = [other for other in clashing if other.robot < robot]
-        known = action.literals | dict(other.unselected for other in earlier)
+        unselected = {other.mark or other.selected: other.mark is not None for other in earlier}
+        known = action.literals | unselected
         if action.at_once:
             adds, deletes = action.adds, action.deletes
         else:

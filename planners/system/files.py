@@ -28,8 +28,6 @@ _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 MAX_TEXT = 2**30
 #: What JSON text takes in memory at least while it is read, in bytes per byte.
 _READING = 4
-#: Reading less text than this asks nothing of the memory that is left, in bytes.
-_SMALL = 2**16
 _CHUNK = 2**20
 
 
@@ -231,7 +229,7 @@ def _require_size(size: int, most: int, position: Position) -> None:
             f"the file holds more than {most / 2**20:,.0f} MiB of text",
             "No file of coordlang is as large: is it the right one?",
         )
-    if size > _SMALL and size * _READING > (left := memory_left()):
+    if size * _READING > (left := memory_left()):
         raise OutOfMemory(
             f"reading {size / 2**20:,.0f} MiB takes {size * _READING / 2**20:,.0f} MiB of memory "
             f"or more, {left / 2**20:,.0f} MiB are left",

@@ -16,7 +16,7 @@ import types
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import Field, field, fields
 from fractions import Fraction
-from itertools import product
+from itertools import chain, product
 from numbers import Real
 from os import PathLike, fspath
 from typing import Any, ForwardRef, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
@@ -107,14 +107,10 @@ def options_of(record: type[object]) -> Iterator[Option]:
 
 
 def _fields(record: type[Any]) -> list[Field[Any]]:
-    """The fields: own ones first, and options before groups."""
-
-    def place(own: Field[Any]) -> tuple[int, bool]:
-        classes = enumerate(record.__mro__)
-        said = next(n for n, one in classes if own.name in inspect.get_annotations(one))
-        return said, "group" in own.metadata
-
-    return sorted(fields(record), key=place)
+    """The fields as they are written, own ones first."""
+    known = {each.name: each for each in fields(record)}
+    names = dict.fromkeys(chain.from_iterable(map(inspect.get_annotations, record.__mro__)))
+    return [known[name] for name in names if name in known]
 
 
 def record_from(
