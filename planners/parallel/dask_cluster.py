@@ -43,10 +43,6 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?:[\w.-]+|\[[0-9a-fA-F:.]+\]):\d{1,5
 _GONE = (OSError, TimeoutError, CancelledError, asyncio.CancelledError, ClosedClientError)
 
 
-class ClusterFailed(CoordlangError):
-    """The cluster is gone, or its workers are lost again and again."""
-
-
 @contextmanager
 def connected(where: str) -> Iterator[Cluster]:
     """Connect to a running cluster, and leave nothing of ours on it.
@@ -117,7 +113,7 @@ class Cluster:
 
         What they share is a plugin of the workers, so that one that joins later has it, too.
         Raises `UsageError` if a worker has other versions than are here, `OutOfMemory` if several
-        are lost in one job, `ClusterFailed` if the scheduler is gone.
+        are lost in one job, `CoordlangError` if the scheduler is gone.
         """
         name = f"coordlang-{uuid4().hex}"
         expected = versions(*batch.packages)
@@ -149,8 +145,8 @@ class Cluster:
                 if self.client.status == "running":
                     self.client.unregister_worker_plugin(name)
 
-    def _gone(self) -> ClusterFailed:
-        return ClusterFailed(
+    def _gone(self) -> CoordlangError:
+        return CoordlangError(
             f"the Dask scheduler {self._where} has gone, or has dropped the work",
             remedy="Start it again; with --resume DIR the finished jobs are kept.",
         )
