@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import stat
 import sys
 import threading
 import time
@@ -147,7 +148,10 @@ class Store:
         """The table of a key; None if there is none, or none that is whole."""
         path, data, why = self._path(key), b"", "is damaged"
         try:
-            if path.stat().st_size <= self._largest:
+            found = path.stat()
+            if not stat.S_ISREG(found.st_mode):  # a pipe would be waited for
+                why = "is no file"
+            elif found.st_size <= self._largest:
                 data = path.read_bytes()
                 if self.most_bytes is not None:
                     with suppress(OSError):  # a folder that is only read
