@@ -30,9 +30,9 @@ from coordlang.required.failure import TooManyToCount, failure_probability
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.sites.world import World
 from coordlang.verification.by_definition import Verdict, verify
-from planners.joint.model import PlanningTask
+from planners.joint.model import JointModel, PlanningTask
 from planners.joint.states import split_atoms
-from planners.joint.tables import Ints
+from planners.joint.tables import Ints, Rows, unique_rows
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import as_executed
@@ -155,10 +155,11 @@ def _examined(name: str | None, language: TaskLanguage) -> ShownTask:
 def _candidates(first: TaskLanguage, random: Random) -> Iterator[TaskLanguage]:
     """Yield the language's candidate tasks in random order, some of them more than once."""
     kind, explored, model = first.language.provenance.tasks.get("kind"), None, first.model.in_step
+    states = unique_rows(model.forgetting_slack(first.partition.rows))[0]
     if kind != "problems":  # many tasks: where states are few they are searched once for all
-        explored = explored_if_small(model, first.partition.rows)
+        explored = explored_if_small(model, states)
     if kind == "all":
-        tasks = _pairs(first, random)
+        tasks = _pairs(model, states, random)
     else:
         listed = recorded_list(first.language)
         random.shuffle(listed)
@@ -179,13 +180,11 @@ def _candidates(first: TaskLanguage, random: Random) -> Iterator[TaskLanguage]:
         )
 
 
-def _pairs(first: TaskLanguage, random: Random) -> Iterator[PlanningTask]:
+def _pairs(model: JointModel, rows: Rows, random: Random) -> Iterator[PlanningTask]:
     """Yield ordered pairs of different listed states, at most 100,000.
 
     Under ``--tasks all`` every state of a candidate task is listed in the language.
     """
-    model = first.model
-    rows = first.partition.rows
     rows = rows[(model.codec.last_labels(rows) < 0).all(axis=1)]
     number = len(rows)
     total = number * (number - 1)

@@ -147,15 +147,16 @@ def test_large_tasks_are_drawn() -> None:
 def test_selection() -> None:
     language, domain, problem = make_language("three-cells", "problem")
     every = select_tasks(language, domain, [problem], 200, 0)
-    assert every.complete
-    assert len(every.tasks) == 30
+    assert (len(every.tasks), every.complete) == (30, True)
     assert sum(task.witness is not None for task in every.tasks) == 6
     fewer = replace(language, states=dict([*language.states.items()][1:]))
     assert not select_tasks(fewer, domain, [problem], 200, 0).complete
     assert b"of these tasks" not in make_report(fewer, domain, [problem], tasks_shown=1).html
     assert "of these tasks leaves" not in str(door.explain(fewer, domain, problem))
-    built = door.build(domain, problem, tasks="all", remember_actions=True, method="greedy")
-    assert select_tasks(built.language, domain, [problem], 200, 0).complete
+    for more in ({"remember_actions": True}, {"slack": 1, "words_see_slack": True}):
+        built = door.build(domain, problem, tasks="all", method="greedy", **more)
+        every = select_tasks(built.language, domain, [problem], 200, 0)
+        assert (len(every.tasks), every.complete) == (30, True)
     language, domain, problem = make_language("t-map", "problem")
 
     def some(seed: int) -> tuple[list[int], ...]:
