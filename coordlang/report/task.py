@@ -155,7 +155,8 @@ def _examined(name: str | None, language: TaskLanguage) -> ShownTask:
 def _candidates(first: TaskLanguage, random: Random) -> Iterator[TaskLanguage]:
     """Yield the language's candidate tasks in random order, some of them more than once."""
     kind, explored, model = first.language.provenance.tasks.get("kind"), None, first.model.in_step
-    states = unique_rows(model.forgetting_slack(first.partition.rows))[0]
+    facts, _ = unique_rows(model.codec.facts_part(model.forgetting_slack(first.partition.rows)))
+    states = np.pad(facts, ((0, 0), (0, model.codec.width - facts.shape[1])))  # at a start
     if kind != "problems":  # many tasks: where states are few they are searched once for all
         explored = explored_if_small(model, states)
     if kind == "all":
@@ -185,7 +186,6 @@ def _pairs(model: JointModel, rows: Rows, random: Random) -> Iterator[PlanningTa
 
     Under ``--tasks all`` every state of a candidate task is listed in the language.
     """
-    rows = rows[(model.codec.last_labels(rows) < 0).all(axis=1)]
     number = len(rows)
     total = number * (number - 1)
     for code in random.sample(range(total), min(total, _PAIRS)):

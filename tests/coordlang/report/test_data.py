@@ -81,14 +81,9 @@ def test_ranks_are_those_of_the_planner() -> None:
         data, task = world.data, world.data["tasks"][0]
         spoken = language_in_task(world.language, world.domain, world.problem)
         plans = Plans.of(spoken.space)
-
-        def by_labels(
-            way: tuple[list[int], list[int]], first: list[int] = task["first"]
-        ) -> list[int]:
-            # Edges of a node are in the order of labels.
-            return [edge - first[node] for edge, node in zip(way[0], way[1], strict=False)]
-
-        for rank, (edges, nodes) in enumerate(sorted(listed_plans(task), key=by_labels)):
+        first = task["first"]  # edges of a node are in the order of labels
+        ways = [([e - first[n] for e, n in zip(*w, strict=False)], w) for w in listed_plans(task)]
+        for rank, (_, (edges, nodes)) in enumerate(sorted(ways)):
             plan = plans.unrank(rank)
             assert [
                 tuple(data["labels"][r][own[edge]]["text"] for r, own in enumerate(task["labels"]))
@@ -157,6 +152,10 @@ def test_selection() -> None:
         built = door.build(domain, problem, tasks="all", method="greedy", **more)
         every = select_tasks(built.language, domain, [problem], 200, 0)
         assert (len(every.tasks), every.complete) == (30, True)
+    domain, problem, options = random_model(0, 3)  # one of its states leads nowhere
+    pairs = all_pairs(domain, [problem], replace(options, remember_actions=True))
+    every = select_tasks(build_language(pairs, "greedy").language, domain, [problem], 200, 0)
+    assert (len(every.tasks), every.complete) == (20, True)
     language, domain, problem = make_language("t-map", "problem")
 
     def some(seed: int) -> tuple[list[int], ...]:
