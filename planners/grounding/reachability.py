@@ -24,7 +24,7 @@ from planners.pddl.lifted import Atom, Domain, Formula, Problem, Schema, Variabl
 from planners.pddl.robots import objects_of
 from planners.system.errors import CoordlangError, OutOfMemory
 from planners.system.limits import memory_left
-from planners.system.signals import postponed_signals
+from planners.system.signals import Postponed, postponed_signals
 
 if TYPE_CHECKING:
     from clingo import Control, Symbol
@@ -92,7 +92,10 @@ def _require_memory(domain: Domain, problem: Problem) -> None:
 
 
 def _least_model(rules: Sequence[str]) -> Control:
-    """A clingo that has found the least model of a Datalog program: its symbolic atoms."""
+    """A clingo that has found the least model of a Datalog program: its symbolic atoms.
+
+    Signals wait: what a handler raises in a callback, ``note`` too, may end the process.
+    """
     from clingo import Control
 
     messages: list[str] = []
@@ -100,16 +103,17 @@ def _least_model(rules: Sequence[str]) -> Control:
     def note(_code: object, message: str) -> None:
         messages.append(message)
 
-    # The first error that clingo reports allocates memory, and without memory ends the process.
-    with suppress(RuntimeError):
-        Control(logger=note).add("base", [], "not a rule")
-    messages.clear()
-    control = Control(logger=note)
-    try:
-        control.add("base", [], "\n".join(rules))
-        _ground(control)
-    except RuntimeError as error:
-        raise _failed(" ".join((str(error), *messages))) from error
+    with postponed_signals() as postponed:
+        # The first error that clingo reports allocates memory, and without memory ends the process.
+        with suppress(RuntimeError):
+            Control(logger=note).add("base", [], "not a rule")
+        messages.clear()
+        control = Control(logger=note)
+        try:
+            control.add("base", [], "\n".join(rules))
+            _ground(control, postponed)
+        except RuntimeError as error:
+            raise _failed(" ".join((str(error), *messages))) from error
     if not any(control.symbolic_atoms.by_signature("goal", 0)):
         raise _failed("its grounding is not complete")
     return control
@@ -139,13 +143,8 @@ class _Stopped(Exception):
     """A signal has arrived."""
 
 
-def _ground(control: Control) -> None:
-    """Ground clingo's program; a signal (Ctrl-C, an alarm) ends it soon.
-
-    clingo runs no signal handler, and an exception that a handler raises in one of its callbacks
-    does not leave clingo as it was.  So signals wait until the next ground rule or the next value
-    in a long join (`_interruptible`) ends the work.
-    """
+def _ground(control: Control, postponed: Postponed) -> None:
+    """Ground clingo's program; a signal that waits ends it at the next rule or `tick`."""
     from clingo.backend import Observer
 
     class Watch(Observer):
@@ -160,7 +159,7 @@ def _ground(control: Control) -> None:
 
     watch = Watch()
     control.register_observer(watch, replace=True)
-    with postponed_signals() as postponed, suppress(_Stopped):
+    with suppress(_Stopped):
         control.ground([("base", [])], context=watch)
 
 
