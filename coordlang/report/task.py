@@ -30,7 +30,7 @@ from coordlang.required.failure import TooManyToCount, failure_probability
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.sites.world import World
 from coordlang.verification.by_definition import Verdict, verify
-from planners.joint.model import JointModel, PlanningTask
+from planners.joint.model import FullState, JointModel, PlanningTask
 from planners.joint.states import split_atoms
 from planners.joint.tables import Ints, Rows, unique_rows
 from planners.pddl.lifted import Domain, Problem
@@ -338,17 +338,18 @@ def _witness_data(
 def task_summary(language: TaskLanguage, world: World) -> dict[str, Any]:
     """Return the start and goal of a task in words and, as ``goals``, on the map."""
     space, model = language.space, language.model
-    init = model.codec.decode(space.rows[space.state[language.start]])
-    literals = split_atoms(goal_text(model, space.goals[space.goal[language.start]]))
-    goals = world.located(literals)
-    false = {a for a in literals if a.startswith("(not ") and a.count("(") == 2}
-    done = {*init, *(a for a in false if a[5:-1] not in init)}
+    init = model.codec.decode(model.forgetting_slack(space.rows[space.state[language.start]]))
+    goal = space.goals[space.goal[language.start]]
+    literals = split_atoms(goal_text(model, goal))
+    starts, goals = world.located(init), world.located(literals)
+    facts = {*model.codec.facts.texts}
+    done = {*init, *(f"(not {fact})" for fact in facts - {*init})}
     others = [a for a in literals if world.role(a)[0] != "at" and a not in done]
+    if isinstance(goal, FullState) and not others and goals.items() <= starts.items():
+        others = [f"(not {fact})" for fact in sorted(facts & {*init} - {*literals})]
     return {
-        "title": _title(world.located(init), goals, others),
-        "goals": [
-            [world.things.index(thing), world.places.index(place)] for thing, place in goals.items()
-        ],
+        "title": _title(starts, goals, others),
+        "goals": [[world.things.index(t), world.places.index(p)] for t, p in goals.items()],
     }
 
 
