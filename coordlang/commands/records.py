@@ -318,7 +318,7 @@ class TasksOptions(AnswerOptions):
     used = "start goal output"
     example = '{MAP} --start "(at r1 ?)" -o tasks.json'
     start: tuple[str, ...] = option((), "Atoms of which starts have others.", "PATTERN")
-    goal: tuple[str, ...] = option((), "Each goal has one atom like this.", "PATTERN")
+    goal: tuple[str, ...] = option((), "A goal has one atom like each of these.", "PATTERN")
     output: str = result_option("The task file")
 
 
