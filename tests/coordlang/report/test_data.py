@@ -41,7 +41,7 @@ WORLDS: list[tuple[str, str, str | None]] = [
     ("handover", "two-doors", "all"),
     ("grid", "three-robots-3x3", None),
 ]
-MORE = [*thorough(("lock", "both-in", "all"), ("elevator", "two-calls", "all"))]
+MORE = thorough(("lock", "both-in", "all"), ("elevator", "two-calls", "all"))
 
 
 @pytest.fixture(autouse=True)

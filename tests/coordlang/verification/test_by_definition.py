@@ -40,7 +40,7 @@ from tests.support.texts import parsed
 SIZES = [
     (2, 60, 8),
     (3, 14, 6),
-    *thorough(*(more for more in ((2, 60, 20), (3, 14, 20), (4, 7, 6)))),
+    *thorough((2, 60, 20), (3, 14, 20), (4, 7, 6)),
     *slow((2, 60, 600), (3, 14, 600), (4, 7, 200)),
 ]
 
