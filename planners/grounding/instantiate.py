@@ -235,6 +235,8 @@ class _Grounder:
         Only where there are many values, subactions are guards, too (`coordlang inspect` names
         subactions that a formula speaks of and that nobody can ever do).
         """
+        if not variables:  # as of most effects
+            return iter((binding,))
         named = {arg for guard in statics for arg in guard.args}
         others = [self._objects(v.types) for v in variables if v.name not in named]
         guards: tuple[Guard, ...] = statics
