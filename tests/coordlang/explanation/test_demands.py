@@ -21,7 +21,7 @@ from coordlang.language.candidates import from_problems
 from coordlang.language.sentences import task_sentences
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
-from tests.support import naive
+from tests.support import naive, thorough
 from tests.support.candidates import random_candidates
 from tests.support.command import Command
 from tests.support.domains import T_MAP, all_tasks
@@ -67,7 +67,7 @@ def own_text(label: str, robot: str) -> str:
     return label.strip("()").replace(f" {robot} ", " ").removesuffix(f" {robot}")
 
 
-@pytest.mark.parametrize("robots", [2, 3])
+@pytest.mark.parametrize("robots", [2, *thorough(3)])
 def test_against_listed_plans(robots: int, monkeypatch: pytest.MonkeyPatch) -> None:
     few = 2
     monkeypatch.setattr("coordlang.explanation.demands.FEW", few)

@@ -62,7 +62,7 @@ def check_exact(language: Language, candidates: Candidates, formulas: dict[str, 
             assert count == sum(holds(alone, own) for own in atoms_of) > 0
 
 
-@pytest.mark.parametrize("robots", [2, 3])
+@pytest.mark.parametrize("robots", [2, *thorough(3)])
 def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
     seen: Counter[str] = Counter()
     for seed, candidates in random_candidates(range(24), robots, 600):

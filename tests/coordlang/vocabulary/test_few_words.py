@@ -33,7 +33,7 @@ from tests.support.task_languages import built_for
 SQUARE = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw1-2x2.pddl"
 
 
-@pytest.mark.parametrize(("robots", "number"), [(2, 30), (3, 20)])
+@pytest.mark.parametrize(("robots", "number"), [(2, 30), *thorough((3, 20))])
 def test_tables_of_plans_measure_what_is_counted(robots: int, number: int) -> None:
     compared = 0
     for seed, (_, space) in enumerate(random_spaces(range(number), robots, 2_000)):

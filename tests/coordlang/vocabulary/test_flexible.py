@@ -67,7 +67,7 @@ def check_measures(candidates: Candidates, word: list[int]) -> int:
     return between
 
 
-@pytest.mark.parametrize("robots", [2, 3])
+@pytest.mark.parametrize("robots", [3, *thorough(2)])
 def test_flexibility_against_its_definition(robots: int) -> None:
     """Shipped maps, random models, and robots on random graphs; goals are partial now and then."""
     maps = [("three-cells", "problem"), ("t-map", "problem"), ("grid", "gw1-2x2")]

@@ -22,7 +22,7 @@ from planners.parallel.workers import workers as opened
 from planners.system.errors import BadInput, CoordlangError, Note, OutOfTime, UsageError
 from planners.system.limits import time_limit
 from tests.support import cluster as dask
-from tests.support import jobs
+from tests.support import jobs, thorough
 from tests.support.cluster import ENVIRONMENT, Cluster, needs_distributed, running_cluster
 from tests.support.domains import DOMAINS
 from tests.support.jobs import batch, until, workers
@@ -68,7 +68,7 @@ def test_results_and_errors(connected: Workers) -> None:
     until(lambda: left_on(connected) == (0, []))
 
 
-@pytest.mark.parametrize(("ends", "limit"), [(KeyboardInterrupt, None), (OutOfTime, 2)])
+@pytest.mark.parametrize(("ends", "limit"), [(KeyboardInterrupt, None), *thorough((OutOfTime, 2))])
 def test_work_that_is_stopped_leaves_nothing(
     ends: type[BaseException], limit: int | None, connected: Workers, tmp_path: Path
 ) -> None:

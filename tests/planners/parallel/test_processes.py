@@ -58,7 +58,7 @@ def test_jobs_do_not_matter_and_small_work_stays_here(monkeypatch: pytest.Monkey
     assert who(squares) == {os.getpid()}  # as a worker of another pool it may start no process
 
 
-@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("number", [1, *thorough(2)])
 def test_errors_are_those_of_the_first_job_that_has_one(number: int) -> None:
     with pytest.raises(BadInput) as caught:
         list(Workers(number).tables(batch(jobs.fails, None, [1, 0, 1])))
