@@ -123,7 +123,7 @@ def all_pairs(
         return Candidates("all", loaded, Explored(space, _to_each_state(space)), len(space))
     forgetting = replace(model.without_slack, codec=replace(model.codec, memory=None))
     base = explore(forgetting, model.codec.facts_part(inits))
-    starts = np.hstack((base.rows, np.zeros((len(base), len(model.robots)), np.uint64)))
+    starts = model.codec.remembering(base.rows, np.full((len(base), len(model.robots)), -1))
     goals = [goal for goal, _ in _to_each_state(base)]
     far = zip(goals, distances_to(base, goals), strict=True)
     groups = [(goal, starts[steps > 0]) for goal, steps in far if (steps > 0).any()]

@@ -155,8 +155,9 @@ def _examined(name: str | None, language: TaskLanguage) -> ShownTask:
 def _candidates(first: TaskLanguage, random: Random) -> Iterator[TaskLanguage]:
     """Yield the language's candidate tasks in random order, some of them more than once."""
     kind, explored, model = first.language.provenance.tasks.get("kind"), None, first.model.in_step
-    facts, _ = unique_rows(model.codec.facts_part(model.forgetting_slack(first.partition.rows)))
-    states = np.pad(facts, ((0, 0), (0, model.codec.width - facts.shape[1])))  # at a start
+    rows, codec = model.forgetting_slack(first.partition.rows), model.codec
+    nothing = np.full_like(codec.last_labels(rows), -1)
+    states, _ = unique_rows(codec.remembering(codec.facts_part(rows), nothing))  # at a start
     if kind != "problems":  # many tasks: where states are few they are searched once for all
         explored = explored_if_small(model, states)
     if kind == "all":

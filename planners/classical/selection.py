@@ -225,6 +225,8 @@ class _SelectThenApply:
         self._stages = dict(zip(order, pairwise((*facts, self._first)), strict=True))
         #: What comes when all have selected, and something is left to do.
         self._first_work = (*facts, self._first)[0]
+        #: Whether a robot before the last one may leave something to do.
+        self._leaves = any(robot + 1 < len(team.names) for _, robot in order)
         marks = {action.mark for action in actions if action.mark is not None}
         #: What is true between two steps, false once something is selected, and restored.
         self._restored = marks | {self._none_left(*one) for one in self._stages}
@@ -319,7 +321,7 @@ class _SelectThenApply:
 
     def _left_before(self, known: Known) -> Iterator[tuple[Set[Atom], Known]]:
         """What is known when all have selected, with `_LEFT` where something is left to do."""
-        if _LEFT not in self.out.facts:  # of no action of the robots before
+        if not self._leaves:
             yield set(), known
             return
         for left in (False, True):
